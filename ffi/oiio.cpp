@@ -1,0 +1,111 @@
+#include "oiio.h"
+
+#include <OpenImageIO/imageio.h>
+
+#include <cstring>
+#include <exception>
+#include <memory>
+#include <string>
+
+namespace {
+
+struct OpenImage {
+  std::unique_ptr<OIIO::ImageInput> input;
+  std::string attribute;
+};
+
+void fail(FluxionError *error, const std::string &message, const char *otherwise) {
+  const std::string text = message.empty() ? otherwise : message;
+  std::strncpy(error->message, text.c_str(), sizeof error->message - 1);
+  error->message[sizeof error->message - 1] = 0;
+}
+
+OIIO::TypeDesc type_of(const char *kind) {
+  if (std::strcmp(kind, "half") == 0) return OIIO::TypeDesc::HALF;
+  if (std::strcmp(kind, "uint8") == 0) return OIIO::TypeDesc::UINT8;
+  return OIIO::TypeDesc::FLOAT;
+}
+
+}  // namespace
+
+extern "C" void *fluxion_image_open(const char *path, FluxionImageSpec *spec, FluxionError *error) try {
+  auto image = std::make_unique<OpenImage>();
+  image->input = OIIO::ImageInput::open(path);
+  if (!image->input) {
+    fail(error, OIIO::geterror(), "the file is missing or of an unknown format");
+    return nullptr;
+  }
+  const OIIO::ImageSpec &found = image->input->spec();
+  spec->width = found.width;
+  spec->height = found.height;
+  spec->channels = found.nchannels;
+  spec->eight_bit = found.format == OIIO::TypeDesc::UINT8;
+  return image.release();
+} catch (const std::exception &exception) {
+  fail(error, exception.what(), "opening the image failed");
+  return nullptr;
+} catch (...) {
+  fail(error, "", "opening the image failed");
+  return nullptr;
+}
+
+extern "C" const char *fluxion_image_channel(void *handle, int index) {
+  const auto &names = static_cast<OpenImage *>(handle)->input->spec().channelnames;
+  return index >= 0 && static_cast<size_t>(index) < names.size() ? names[index].c_str() : nullptr;
+}
+
+extern "C" const char *fluxion_image_attribute(void *handle, const char *name) try {
+  auto *image = static_cast<OpenImage *>(handle);
+  const OIIO::ParamValue *value = image->input->spec().find_attribute(name);
+  if (!value) return nullptr;
+  image->attribute = value->get_string();
+  return image->attribute.c_str();
+} catch (...) {
+  return nullptr;
+}
+
+extern "C" bool fluxion_image_read(void *handle, float *pixels, FluxionError *error) try {
+  auto *image = static_cast<OpenImage *>(handle);
+  const int channels = image->input->spec().nchannels;
+  if (image->input->read_image(0, 0, 0, channels, OIIO::TypeDesc::FLOAT, pixels)) return true;
+  fail(error, image->input->geterror(), "the pixels could not be read: the file may be truncated");
+  return false;
+} catch (const std::exception &exception) {
+  fail(error, exception.what(), "reading the image failed");
+  return false;
+} catch (...) {
+  fail(error, "", "reading the image failed");
+  return false;
+}
+
+extern "C" void fluxion_image_close(void *handle) { delete static_cast<OpenImage *>(handle); }
+
+extern "C" bool fluxion_image_write(const char *path, const FluxionImageSpec *wanted, const char *const *channels,
+                                    const float *pixels, const char *kind, const char *compression,
+                                    const FluxionAttribute *attributes, size_t attribute_count,
+                                    FluxionError *error) try {
+  auto output = OIIO::ImageOutput::create(path);
+  if (!output) {
+    fail(error, OIIO::geterror(), "no writer for this file name's extension");
+    return false;
+  }
+  OIIO::ImageSpec spec(wanted->width, wanted->height, wanted->channels, type_of(kind));
+  for (int i = 0; i < wanted->channels; ++i) spec.channelnames[i] = channels[i];
+  if (compression) spec.attribute("compression", compression);
+  for (size_t i = 0; i < attribute_count; ++i) spec.attribute(attributes[i].name, attributes[i].value);
+  if (!output->open(path, spec) || !output->write_image(OIIO::TypeDesc::FLOAT, pixels)) {
+    fail(error, output->geterror(), "the file could not be written");
+    return false;
+  }
+  if (!output->close()) {
+    fail(error, output->geterror(), "the file could not be finished");
+    return false;
+  }
+  return true;
+} catch (const std::exception &exception) {
+  fail(error, exception.what(), "writing the image failed");
+  return false;
+} catch (...) {
+  fail(error, "", "writing the image failed");
+  return false;
+}

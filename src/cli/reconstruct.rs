@@ -1,0 +1,61 @@
+//! `fluxion reconstruct`.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::Instant;
+
+use anyhow::Result;
+use fluxion::film::{Layer, exr};
+use fluxion::reconstruct;
+
+use super::outputs::Claims;
+use super::render::{solve, write};
+use super::stats::Stats;
+
+/// Options of `reconstruct`.
+#[derive(clap::Args)]
+pub struct Args {
+    /// EXR file written by `fluxion render --layers`
+    layers: PathBuf,
+    /// Image to write, by its extension: exr, hdr, pfm, png or jpg; may be given several times
+    #[arg(short, long, required = true, value_name = "FILE")]
+    output: Vec<PathBuf>,
+    /// Reconstruction with its parameters; `fluxion info --methods` lists them
+    #[arg(long, default_value = reconstruct::DEFAULT, value_name = "NAME[:KEY=VALUE,...]")]
+    method: String,
+    /// Threads to work with (0: one per core)
+    #[arg(long, default_value_t = 0)]
+    threads: usize,
+    /// JSON file for times and memory
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Show no progress
+    #[arg(short, long)]
+    quiet: bool,
+}
+
+/// Reads layers, reconstructs and writes.
+pub fn run(args: &Args) -> Result<ExitCode> {
+    super::use_threads(args.threads)?;
+    let method = reconstruct::parse(&args.method)?;
+    let mut stats = Stats { method: args.method.clone(), ..Stats::default() };
+    let start = Instant::now();
+    let mut frame = exr::load(&args.layers)?;
+    let _claims = Claims::new(&args.output, &[&args.json])?;
+    stats.seconds.load = start.elapsed().as_secs_f64();
+    stats.spp = frame.attribute("fluxion:spp").and_then(|text| text.parse().ok()).unwrap_or(0);
+    stats.plan = frame.attribute("fluxion:plan").unwrap_or_default().to_owned();
+    let sum = |layer| frame.get(layer).map_or(0.0, |image| image.data.iter().map(|&n| f64::from(n)).sum());
+    (stats.samples, stats.rejected) = (sum(Layer::Samples) as u64, sum(Layer::Rejected) as u64);
+    let solution = solve(method.as_ref(), &frame, args.quiet, &mut stats)?;
+    for (name, value) in &mut frame.attributes {
+        if name == "fluxion:method" {
+            value.clone_from(&args.method);
+        }
+    }
+    write(&args.output, &solution, &frame, &mut stats)?;
+    if let Some(path) = &args.json {
+        stats.save(path)?;
+    }
+    Ok(ExitCode::SUCCESS)
+}

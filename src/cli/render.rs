@@ -1,0 +1,247 @@
+//! `fluxion render`.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use anyhow::{Result, bail};
+use fluxion::error::Error;
+use fluxion::film::{Frame, Layer, Needs, exr};
+use fluxion::image::io;
+use fluxion::plan::Plan;
+use fluxion::reconstruct::{self, Context, Solution};
+use fluxion::render::gradient::Tracer;
+use fluxion::render::{self, Budget, Control, Outcome, SampleId, Settings};
+use fluxion::scene::{Scene, load};
+
+use super::outputs::Claims;
+use super::stats::Stats;
+use super::{progress, stats};
+
+/// Options of `render`.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Scene file, Mitsuba 3 XML
+    scene: PathBuf,
+    /// Image to write, by its extension: exr, hdr, pfm, png or jpg; may be given several times
+    #[arg(short, long, required_unless_present = "replay", value_name = "FILE")]
+    output: Vec<PathBuf>,
+    /// Samples per pixel [default: the scene's own]
+    #[arg(long, conflicts_with = "time", value_parser = clap::value_parser!(u32).range(1..))]
+    spp: Option<u32>,
+    /// Seconds to render for, as in 60 or 60s
+    #[arg(long, value_parser = parse_seconds, value_name = "SECONDS")]
+    time: Option<Duration>,
+    /// Seed of the random numbers; the same seed gives the same bits on any number of threads
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    /// Threads to work with (0: one per core)
+    #[arg(long, default_value_t = 0)]
+    threads: usize,
+    /// Film size in place of the scene's, as in 640x360
+    #[arg(long, value_parser = super::parse_size, value_name = "WxH")]
+    size: Option<(usize, usize)>,
+    /// Reconstruction with its parameters; `fluxion info --methods` lists them
+    #[arg(long, default_value = reconstruct::DEFAULT, value_name = "NAME[:KEY=VALUE,...]")]
+    method: String,
+    /// EXR file for everything that was recorded, for `fluxion reconstruct`
+    #[arg(long, value_name = "FILE")]
+    layers: Option<PathBuf>,
+    /// Record the statistics of eight independent groups of samples in the layers
+    #[arg(long, requires = "layers")]
+    bins: bool,
+    /// JSON file for times, samples, memory and what was left out
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Trace one sample again and print it: column, row and number of the sample
+    #[arg(long, value_parser = parse_sample, value_name = "X,Y,S")]
+    replay: Option<(usize, usize, u32)>,
+    /// Value of a scene parameter, over its <default>
+    #[arg(short = 'D', value_parser = super::parse_definition, value_name = "NAME=VALUE")]
+    define: Vec<(String, String)>,
+    /// Roughness above which paths are reconnected through a material instead of half-vector copied
+    #[arg(long, default_value_t = 0.01, hide_short_help = true)]
+    shift_threshold: f32,
+    /// Show no progress
+    #[arg(short, long)]
+    quiet: bool,
+}
+
+fn parse_seconds(text: &str) -> Result<Duration, String> {
+    let number = text.strip_suffix('s').unwrap_or(text).parse::<f64>().ok().filter(|&t| t > 0.0);
+    let duration = number.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
+    duration.ok_or_else(|| "a time is a positive number of seconds, as in 60 or 1.5s".into())
+}
+
+fn parse_sample(text: &str) -> Result<(usize, usize, u32), String> {
+    let parts: Vec<_> = text.split(',').map(str::trim).collect();
+    let error = || "a sample is written X,Y,S, as in 10,20,3".to_owned();
+    match parts.as_slice() {
+        [x, y, s] => {
+            Ok((x.parse().map_err(|_| error())?, y.parse().map_err(|_| error())?, s.parse().map_err(|_| error())?))
+        }
+        _ => Err(error()),
+    }
+}
+
+/// Renders, reconstructs and writes.
+pub fn run(args: &Args) -> Result<ExitCode> {
+    super::use_threads(args.threads)?;
+    let method = reconstruct::parse(&args.method)?;
+    let _claims = Claims::new(&args.output, &[&args.layers, &args.json])?;
+    let mut stats = Stats { method: args.method.clone(), ..Stats::default() };
+    let start = Instant::now();
+    let options = load::Options { parameters: args.define.clone(), size: args.size, threads: args.threads };
+    let scene = load::load(&args.scene, &options)?;
+    stats.seconds.load = start.elapsed().as_secs_f64();
+    if scene.emitters().is_empty() {
+        eprintln!("warning: nothing in {} emits light: the image is black", args.scene.display());
+    }
+    let saved = match &args.layers {
+        Some(_) => Needs { features: true, edges: method.needs().edges, bins: args.bins },
+        None => Needs::default(),
+    };
+    let plan = Plan::new(&scene, method.needs(), saved);
+    stats.plan = plan.summary();
+    if let Some(sample) = args.replay {
+        return replay(args, &scene, sample);
+    }
+    let outcome = trace(args, &scene, plan.needs)?;
+    warn(args, &outcome);
+    stats.seconds.render = outcome.elapsed.as_secs_f64();
+    (stats.spp, stats.samples, stats.rejected) = (outcome.spp, outcome.film.samples(), outcome.film.rejected());
+
+    let start = Instant::now();
+    let mut frame = outcome.film.develop();
+    if method.needs().edges && !plan.needs.edges {
+        fill_dark_edges(&mut frame);
+    }
+    frame.attributes = attributes(args, &scene, &stats);
+    stats.seconds.develop = start.elapsed().as_secs_f64();
+    if let Some(path) = &args.layers {
+        let start = Instant::now();
+        exr::save(path, &frame)?;
+        stats.seconds.write += start.elapsed().as_secs_f64();
+    }
+    let solution = solve(method.as_ref(), &frame, args.quiet, &mut stats)?;
+    write(&args.output, &solution, &frame, &mut stats)?;
+    if let Some(path) = &args.json {
+        stats.save(path)?;
+    }
+    report(args, &stats);
+    Ok(ExitCode::SUCCESS)
+}
+
+fn trace(args: &Args, scene: &Scene, needs: Needs) -> Result<Outcome> {
+    let stop = Arc::new(AtomicBool::new(false));
+    let handler = Arc::clone(&stop);
+    ctrlc::set_handler(move || {
+        // The second time it is meant.
+        if handler.swap(true, Ordering::Relaxed) {
+            std::process::exit(130);
+        }
+        eprintln!("\nstopping after the running tiles; once more ends at once");
+    })?;
+    let budget = match args.time {
+        Some(time) => Budget::Time(time),
+        None => Budget::Spp(args.spp.unwrap_or(scene.sensor().spp)),
+    };
+    let settings = Settings { budget, seed: args.seed, needs, shift_threshold: args.shift_threshold };
+    let bar = progress::bar(args.quiet);
+    bar.set_message("rendering");
+    let report = |share| progress::set(&bar, share);
+    let outcome = render::render(scene, settings, &Control { stop: &stop, progress: &report });
+    bar.finish_and_clear();
+    Ok(outcome)
+}
+
+fn warn(args: &Args, outcome: &Outcome) {
+    if outcome.stopped {
+        eprintln!("warning: stopped early; the image has up to {} samples per pixel", outcome.spp);
+    }
+    if let Some((id, reason)) = outcome.first_rejected {
+        let (count, SampleId { x, y, index, seed }) = (outcome.film.rejected(), id);
+        eprintln!("warning: {count} samples were not finite ({}) and count as zero; the first one again:", reason.0);
+        eprintln!("  fluxion render {} --seed {seed} --replay {x},{y},{index}", args.scene.display());
+    }
+}
+
+/// In a scene without scattered light all differences are known to be zero.
+fn fill_dark_edges(frame: &mut Frame) {
+    let black = fluxion::image::Image::new(frame.width, frame.height, 3);
+    for layer in [Layer::Dx, Layer::DxVariance, Layer::Dy, Layer::DyVariance] {
+        frame.set(layer, black.clone());
+    }
+}
+
+fn attributes(args: &Args, scene: &Scene, stats: &Stats) -> Vec<(String, String)> {
+    let pairs = [
+        ("fluxion:version", env!("CARGO_PKG_VERSION").to_owned()),
+        ("fluxion:scene", args.scene.file_name().unwrap_or_default().to_string_lossy().into_owned()),
+        ("fluxion:fingerprint", format!("{:016x}", scene.fingerprint())),
+        ("fluxion:seed", args.seed.to_string()),
+        ("fluxion:spp", stats.spp.to_string()),
+        ("fluxion:seconds", format!("{:.3}", stats.seconds.render)),
+        ("fluxion:method", args.method.clone()),
+        ("fluxion:plan", stats.plan.clone()),
+    ];
+    pairs.map(|(name, value)| (name.to_owned(), value)).to_vec()
+}
+
+/// Reconstructs with progress and takes the time.
+pub fn solve(
+    method: &dyn reconstruct::Reconstruction,
+    frame: &Frame,
+    quiet: bool,
+    stats: &mut Stats,
+) -> Result<Solution> {
+    let start = Instant::now();
+    let bar = progress::bar(quiet);
+    let report = |what: &str, share| {
+        bar.set_message(what.to_owned());
+        progress::set(&bar, share);
+    };
+    let solution = reconstruct::solve(method, frame, &Context { progress: &report })?;
+    bar.finish_and_clear();
+    stats.seconds.reconstruct = start.elapsed().as_secs_f64();
+    Ok(solution)
+}
+
+/// Writes the image to every output and takes the time.
+pub fn write(outputs: &[PathBuf], solution: &Solution, frame: &Frame, stats: &mut Stats) -> Result<()> {
+    let start = Instant::now();
+    for path in outputs {
+        io::write_color(path, &solution.image, &frame.attributes)?;
+    }
+    stats.seconds.write += start.elapsed().as_secs_f64();
+    Ok(())
+}
+
+fn report(args: &Args, stats: &stats::Stats) {
+    if args.quiet {
+        return;
+    }
+    let rate = stats.samples as f64 / stats.seconds.render.max(1e-9) / 1e6;
+    let time = |seconds| progress::seconds(Duration::from_secs_f64(seconds));
+    eprintln!(
+        "load {}, render {} ({} spp, {rate:.2} million samples a second), reconstruct {}, write {}",
+        time(stats.seconds.load),
+        time(stats.seconds.render),
+        stats.spp,
+        time(stats.seconds.reconstruct),
+        time(stats.seconds.write)
+    );
+}
+
+fn replay(args: &Args, scene: &Scene, (x, y, index): (usize, usize, u32)) -> Result<ExitCode> {
+    let sensor = scene.sensor();
+    if x >= sensor.width || y >= sensor.height {
+        bail!(Error::Usage(format!("pixel {x},{y} is outside the film of {}x{}", sensor.width, sensor.height)));
+    }
+    let id = SampleId { seed: args.seed, x, y, index };
+    let sample = render::sample(scene, id, Some(&mut Tracer::new(args.shift_threshold)));
+    println!("{sample:#?}");
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,56 @@
+//! What a run took, as one JSON object.
+
+use std::path::Path;
+
+use anyhow::{Context, Result};
+use serde::Serialize;
+
+/// Wall-clock seconds of the stages.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct Seconds {
+    /// Reading the scene or the layers, building the hierarchy.
+    pub load: f64,
+    /// Tracing.
+    pub render: f64,
+    /// Sums to means.
+    pub develop: f64,
+    /// The method.
+    pub reconstruct: f64,
+    /// Writing all outputs.
+    pub write: f64,
+}
+
+/// The object that `--json` writes.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Stats {
+    /// Time per stage.
+    pub seconds: Seconds,
+    /// Samples per pixel.
+    pub spp: u32,
+    /// Samples of all pixels.
+    pub samples: u64,
+    /// Largest resident memory of the process.
+    pub peak_bytes: u64,
+    /// Samples that were not finite.
+    pub rejected: u64,
+    /// The method as it was asked for.
+    pub method: String,
+    /// What was computed and what was left out.
+    pub plan: String,
+}
+
+impl Stats {
+    /// Writes the object, with the peak memory as it is now.
+    pub fn save(&mut self, path: &Path) -> Result<()> {
+        self.peak_bytes = peak_bytes();
+        let text = serde_json::to_string_pretty(self)?;
+        std::fs::write(path, text + "\n").with_context(|| format!("cannot write {}", path.display()))
+    }
+}
+
+/// Largest resident set so far, 0 where the system does not say.
+fn peak_bytes() -> u64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
+    line.and_then(|rest| rest.trim().trim_end_matches("kB").trim().parse::<u64>().ok()).unwrap_or(0) * 1024
+}

@@ -1,0 +1,291 @@
+//! Embree as types that only allow the right order: [`Device`] → [`SceneBuilder`] → [`Committed`].
+//!
+//! Geometry is added to a builder, and committing consumes it; only a committed scene can be traced:
+//!
+//! ```compile_fail
+//! # use fluxion::ffi::embree::{Device, Ray};
+//! let builder = Device::new(1)?.scene();
+//! builder.intersect(&Ray::default()); // error: nothing is traced before commit
+//! # Ok::<(), fluxion::error::Error>(())
+//! ```
+//! ```compile_fail
+//! # use fluxion::ffi::embree::Device;
+//! let mut builder = Device::new(1)?.scene();
+//! let scene = builder.commit()?;
+//! builder.add_spheres(vec![]); // error: nothing is added after commit
+//! # Ok::<(), fluxion::error::Error>(())
+//! ```
+//!
+//! Buffers are shared with Embree without a copy; the committed scene keeps them alive.
+#![allow(unsafe_code)]
+
+use std::ffi::{CStr, CString, c_char, c_int, c_void};
+use std::sync::{Arc, Mutex};
+
+use super::raw::embree as raw;
+use crate::error::{Error, Result};
+
+/// Where a ray meets a surface first.
+pub use raw::FluxionHit as Hit;
+/// A ray; `t` counts in units of the direction's length, which need not be one.
+pub use raw::FluxionRay as Ray;
+
+/// What Embree's error callback has said, waiting to be fetched after the call that caused it.
+type Complaint = Mutex<Option<String>>;
+
+/// A handle that is released once, after everything built from it.
+struct DeviceHandle {
+    raw: *mut c_void,
+    /// Boxed: Embree holds its address.
+    complaint: Box<Complaint>,
+}
+
+// SAFETY: Embree's device and scene functions may be called from any thread; the complaint is behind a mutex.
+unsafe impl Send for DeviceHandle {}
+// SAFETY: as above.
+unsafe impl Sync for DeviceHandle {}
+
+impl DeviceHandle {
+    fn check(&self) -> Result<()> {
+        let mut complaint = self.complaint.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        complaint.take().map_or(Ok(()), |message| Err(Error::Embree(message)))
+    }
+}
+
+impl Drop for DeviceHandle {
+    fn drop(&mut self) {
+        // SAFETY: `raw` came from fluxion_device_new and is released exactly once.
+        unsafe { raw::fluxion_device_release(self.raw) }
+    }
+}
+
+unsafe extern "C" fn remember(user: *mut c_void, code: c_int, message: *const c_char) {
+    // SAFETY: Embree passes back the complaint's address given at creation, and a NUL-terminated string.
+    let (complaint, message) = unsafe { (&*user.cast::<Complaint>(), CStr::from_ptr(message)) };
+    let mut slot = complaint.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+    slot.get_or_insert_with(|| format!("{} (error code {code})", message.to_string_lossy()));
+}
+
+/// An Embree device: its threads and its error channel.
+pub struct Device(Arc<DeviceHandle>);
+
+impl Device {
+    /// A device that builds with `threads` threads (0: all).
+    pub fn new(threads: usize) -> Result<Self> {
+        Self::with_config(&format!("threads={threads}"))
+    }
+
+    /// A device with a configuration string in Embree's own syntax.
+    pub fn with_config(config: &str) -> Result<Self> {
+        let config = CString::new(config).map_err(|_| Error::Embree("configuration holds a NUL byte".into()))?;
+        let complaint = Box::new(Mutex::new(None));
+        let user = std::ptr::from_ref::<Complaint>(&complaint).cast_mut().cast();
+        // SAFETY: the string lives through the call; the complaint is boxed and outlives the device.
+        let raw = unsafe { raw::fluxion_device_new(config.as_ptr(), Some(remember), user) };
+        if raw.is_null() {
+            let message = complaint.lock().ok().and_then(|mut slot| slot.take());
+            return Err(Error::Embree(message.unwrap_or_else(|| "out of memory".into())));
+        }
+        let device = Self(Arc::new(DeviceHandle { raw, complaint }));
+        device.0.check()?;
+        Ok(device)
+    }
+
+    /// Embree's version: major, minor, patch.
+    pub fn version(&self) -> (u32, u32, u32) {
+        // SAFETY: the device is alive.
+        let version = unsafe { raw::fluxion_embree_version(self.0.raw) }.unsigned_abs();
+        (version / 10000, version / 100 % 100, version % 100)
+    }
+
+    /// An empty scene to fill.
+    pub fn scene(&self) -> SceneBuilder {
+        // SAFETY: the device is alive, and the builder keeps it so.
+        let raw = unsafe { raw::fluxion_scene_new(self.0.raw) };
+        SceneBuilder(SceneHandle { raw, buffers: Vec::new(), device: Arc::clone(&self.0) })
+    }
+}
+
+/// What a scene's geometry points into.
+enum Buffer {
+    Triangles { _vertices: Arc<PaddedVertices>, _indices: Arc<Vec<[u32; 3]>> },
+    Spheres { _spheres: Vec<[f32; 4]> },
+}
+
+struct SceneHandle {
+    raw: *mut c_void,
+    buffers: Vec<Buffer>,
+    device: Arc<DeviceHandle>,
+}
+
+// SAFETY: a committed scene is only read, which Embree allows from any number of threads.
+unsafe impl Send for SceneHandle {}
+// SAFETY: as above.
+unsafe impl Sync for SceneHandle {}
+
+impl Drop for SceneHandle {
+    fn drop(&mut self) {
+        // SAFETY: released once; the buffers and the device are dropped after this.
+        unsafe { raw::fluxion_scene_release(self.raw) }
+    }
+}
+
+/// Vertex positions followed by one more float, which Embree's 16-byte loads may read.
+pub struct PaddedVertices {
+    floats: Vec<f32>,
+}
+
+impl PaddedVertices {
+    /// Flattens `vertices` and adds the padding.
+    pub fn new(vertices: impl ExactSizeIterator<Item = [f32; 3]>) -> Self {
+        let mut floats = Vec::with_capacity(vertices.len() * 3 + 1);
+        vertices.for_each(|vertex| floats.extend_from_slice(&vertex));
+        floats.push(0.0);
+        Self { floats }
+    }
+
+    /// Number of vertices.
+    pub fn len(&self) -> usize {
+        self.floats.len() / 3
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Position of vertex `index`.
+    pub fn get(&self, index: u32) -> [f32; 3] {
+        let at = index as usize * 3;
+        [self.floats[at], self.floats[at + 1], self.floats[at + 2]]
+    }
+}
+
+/// A scene that is still being filled.
+pub struct SceneBuilder(SceneHandle);
+
+impl SceneBuilder {
+    /// Adds a triangle mesh and returns its geometry number. Every index must be below the vertex count.
+    pub fn add_triangles(&mut self, vertices: &Arc<PaddedVertices>, indices: &Arc<Vec<[u32; 3]>>) -> Result<u32> {
+        if indices.iter().flatten().any(|&index| index as usize >= vertices.len()) {
+            return Err(Error::Embree("a triangle names a vertex that does not exist".into()));
+        }
+        // SAFETY: both buffers have the stated lengths, the vertices are padded, every index is in range, and
+        // `self.0.buffers` keeps them alive and unmoved (they are behind Arcs) until the scene is released.
+        let id = unsafe {
+            raw::fluxion_scene_add_triangles(
+                self.0.device.raw,
+                self.0.raw,
+                vertices.floats.as_ptr(),
+                vertices.len(),
+                indices.as_ptr().cast(),
+                indices.len(),
+            )
+        };
+        let kept = Buffer::Triangles { _vertices: Arc::clone(vertices), _indices: Arc::clone(indices) };
+        self.0.buffers.push(kept);
+        self.0.device.check()?;
+        Ok(id)
+    }
+
+    /// Adds spheres given as centre and radius, and returns their common geometry number.
+    pub fn add_spheres(&mut self, spheres: Vec<[f32; 4]>) -> Result<u32> {
+        // SAFETY: the buffer has the stated length, and its heap block lives in `self.0.buffers`.
+        let id = unsafe {
+            raw::fluxion_scene_add_spheres(self.0.device.raw, self.0.raw, spheres.as_ptr().cast(), spheres.len())
+        };
+        self.0.buffers.push(Buffer::Spheres { _spheres: spheres });
+        self.0.device.check()?;
+        Ok(id)
+    }
+
+    /// Builds the hierarchy.
+    pub fn commit(self) -> Result<Committed> {
+        // SAFETY: the scene is alive and nobody else has it.
+        unsafe { raw::fluxion_scene_commit(self.0.raw) }
+        self.0.device.check()?;
+        Ok(Committed(self.0))
+    }
+}
+
+/// A scene that can be traced, from any number of threads.
+pub struct Committed(SceneHandle);
+
+impl Committed {
+    /// The first surface along the ray between `t_near` and `t_far`.
+    #[inline]
+    pub fn intersect(&self, ray: &Ray) -> Option<Hit> {
+        let mut hit = Hit::default();
+        // SAFETY: the scene is committed; both pointers are valid for the call.
+        unsafe { raw::fluxion_intersect(self.0.raw, ray, &mut hit) }.then_some(hit)
+    }
+
+    /// Whether anything lies on the ray between `t_near` and `t_far`.
+    #[inline]
+    pub fn occluded(&self, ray: &Ray) -> bool {
+        // SAFETY: as above.
+        unsafe { raw::fluxion_occluded(self.0.raw, ray) }
+    }
+
+    /// Lower and upper corner of the scene's box; the lower is above the upper when it is empty.
+    pub fn bounds(&self) -> ([f32; 3], [f32; 3]) {
+        let (mut lower, mut upper) = ([0.0; 3], [0.0; 3]);
+        // SAFETY: the scene is committed; the arrays hold three floats each.
+        unsafe { raw::fluxion_scene_bounds(self.0.raw, lower.as_mut_ptr(), upper.as_mut_ptr()) }
+        (lower, upper)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn unit_triangle() -> (Arc<PaddedVertices>, Arc<Vec<[u32; 3]>>) {
+        let vertices = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+        (Arc::new(PaddedVertices::new(vertices.into_iter())), Arc::new(vec![[0, 1, 2]]))
+    }
+
+    fn ray(x: f32, y: f32) -> Ray {
+        Ray { origin: [x, y, 1.0], t_near: 0.0, direction: [0.0, 0.0, -1.0], t_far: f32::INFINITY }
+    }
+
+    #[test]
+    fn a_triangle_and_a_sphere_are_hit_where_they_are() {
+        let device = Device::new(1).unwrap();
+        let (vertices, indices) = unit_triangle();
+        let mut builder = device.scene();
+        let triangle = builder.add_triangles(&vertices, &indices).unwrap();
+        let sphere = builder.add_spheres(vec![[5.0, 0.0, 0.0, 0.5]]).unwrap();
+        let scene = builder.commit().unwrap();
+        drop((device, vertices, indices));
+
+        let hit = scene.intersect(&ray(0.25, 0.5)).unwrap();
+        assert_eq!((hit.geometry, hit.primitive), (triangle, 0));
+        assert!((hit.t - 1.0).abs() < 1e-6 && (hit.u - 0.25).abs() < 1e-6 && (hit.v - 0.5).abs() < 1e-6);
+        let hit = scene.intersect(&ray(5.0, 0.0)).unwrap();
+        assert_eq!(hit.geometry, sphere);
+        assert!((hit.t - 0.5).abs() < 1e-5);
+        assert!(scene.intersect(&ray(2.0, 2.0)).is_none());
+        assert!(scene.occluded(&ray(0.25, 0.5)) && !scene.occluded(&ray(2.0, 2.0)));
+    }
+
+    #[test]
+    fn an_index_out_of_range_and_a_bad_configuration_are_errors() {
+        let device = Device::new(1).unwrap();
+        let (vertices, _) = unit_triangle();
+        let error = device.scene().add_triangles(&vertices, &Arc::new(vec![[0, 1, 3]])).unwrap_err();
+        assert!(error.to_string().contains("vertex"));
+        assert!(Device::with_config("isa=no_such_isa\0").is_err());
+    }
+
+    #[test]
+    fn an_error_callback_surfaces_as_an_error() {
+        let device = Device::new(1).unwrap();
+        // SAFETY: the callback gets the live complaint and a static string, as from Embree.
+        unsafe {
+            remember(std::ptr::from_ref::<Complaint>(&device.0.complaint).cast_mut().cast(), 2, c"no room".as_ptr())
+        };
+        assert_eq!(device.0.check().unwrap_err().to_string(), "embree: no room (error code 2)");
+        assert!(device.0.check().is_ok());
+    }
+}

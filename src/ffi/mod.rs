@@ -1,0 +1,23 @@
+//! Safe wrappers around the C libraries: the only unsafe code of the crate.
+
+pub mod embree;
+pub mod oiio;
+
+/// The declarations that bindgen makes from the headers under `ffi/`.
+#[allow(
+    unsafe_code,
+    dead_code,
+    missing_docs,
+    non_camel_case_types,
+    non_upper_case_globals,
+    non_snake_case,
+    clippy::all
+)]
+mod raw {
+    pub mod embree {
+        include!(concat!(env!("OUT_DIR"), "/embree.rs"));
+    }
+    pub mod oiio {
+        include!(concat!(env!("OUT_DIR"), "/oiio.rs"));
+    }
+}

@@ -1,0 +1,119 @@
+//! Film to frame: sums become means, and the two ends of every edge are joined.
+
+use super::sample::{Moments, bin_count};
+use super::{BINS, Film, Frame, Layer, Tile};
+use crate::image::Image;
+
+/// Positions of right, left, down and up among a pixel's twelve edge values.
+const RIGHT: usize = 0;
+const LEFT: usize = 3;
+const DOWN: usize = 6;
+const UP: usize = 9;
+
+impl Film {
+    /// Means and variances of the mean of everything recorded so far.
+    pub fn develop(&self) -> Frame {
+        let mut frame = Frame::new(self.width, self.height);
+        frame.set(Layer::Color, self.image(3, |tile, i, c| tile.color[i].mean[c]));
+        frame.set(Layer::ColorVariance, self.image(3, |tile, i, c| tile.color[i].variance_of_mean(c, tile.counts[i])));
+        frame.set(Layer::Direct, self.image(3, |tile, i, c| tile.direct[i].mean[c]));
+        frame
+            .set(Layer::DirectVariance, self.image(3, |tile, i, c| tile.direct[i].variance_of_mean(c, tile.counts[i])));
+        frame.set(Layer::Samples, self.image(1, |tile, i, _| tile.counts[i] as f32));
+        frame.set(Layer::Rejected, self.image(1, |tile, i, _| tile.rejected[i] as f32));
+        if self.needs.features {
+            let features = [
+                (Layer::Albedo, Layer::AlbedoVariance, 0, 3),
+                (Layer::Normal, Layer::NormalVariance, 3, 3),
+                (Layer::Depth, Layer::DepthVariance, 6, 1),
+            ];
+            for (mean, variance, first, channels) in features {
+                frame.set(mean, self.image(channels, |tile, i, c| tile.features[i].mean[first + c]));
+                let value =
+                    |tile: &Tile, i: usize, c: usize| tile.features[i].variance_of_mean(first + c, tile.counts[i]);
+                frame.set(variance, self.image(channels, value));
+            }
+        }
+        if self.needs.edges {
+            for (mean, variance, here, there) in
+                [(Layer::Dx, Layer::DxVariance, RIGHT, LEFT), (Layer::Dy, Layer::DyVariance, DOWN, UP)]
+            {
+                let step = if here == RIGHT { (1, 0) } else { (0, 1) };
+                frame.set(
+                    mean,
+                    self.edge_image(step, |tile, i, near, c| {
+                        let end = if near { here } else { there };
+                        tile.edges[i].mean[end + c] * if near { 1.0 } else { -1.0 }
+                    }),
+                );
+                frame.set(
+                    variance,
+                    self.edge_image(step, |tile, i, near, c| {
+                        let moments: &Moments<12> = &tile.edges[i];
+                        moments.variance_of_mean(if near { here } else { there } + c, tile.counts[i])
+                    }),
+                );
+            }
+        }
+        if self.needs.bins {
+            for k in 0..BINS {
+                self.develop_bin(&mut frame, k);
+            }
+        }
+        frame
+    }
+
+    fn develop_bin(&self, frame: &mut Frame, k: usize) {
+        let number = k as u8;
+        frame.set(Layer::BinColor(number), self.image(3, |tile, i, c| tile.bins[i][k].color[c]));
+        if !self.needs.edges {
+            return;
+        }
+        for (layer, step, here, there) in
+            [(Layer::BinDx(number), (1, 0), RIGHT, LEFT), (Layer::BinDy(number), (0, 1), DOWN, UP)]
+        {
+            frame.set(
+                layer,
+                self.edge_image(step, |tile, i, near, c| {
+                    let end = if near { here } else { there } / 3;
+                    debug_assert!(bin_count(tile.counts[i], k) <= tile.counts[i]);
+                    tile.bins[i][k].edges[end][c] * if near { 1.0 } else { -1.0 }
+                }),
+            );
+        }
+    }
+
+    /// The tile of a pixel and its position in it.
+    fn at(&self, x: usize, y: usize) -> (&Tile, usize) {
+        let columns = self.width.div_ceil(super::TILE);
+        let tile = &self.tiles[y / super::TILE * columns + x / super::TILE];
+        (tile, (y - tile.y) * tile.width + (x - tile.x))
+    }
+
+    fn image(&self, channels: usize, value: impl Fn(&Tile, usize, usize) -> f32) -> Image {
+        let mut image = Image::new(self.width, self.height, channels);
+        for tile in &self.tiles {
+            for i in 0..tile.counts.len() {
+                let pixel = image.pixel_mut(tile.x + i % tile.width, tile.y + i / tile.width);
+                pixel.iter_mut().enumerate().for_each(|(c, slot)| *slot = value(tile, i, c));
+            }
+        }
+        image
+    }
+
+    /// Sums of a value at the near end (`true`) and the far end (`false`) of every edge along `step`.
+    fn edge_image(&self, step: (usize, usize), value: impl Fn(&Tile, usize, bool, usize) -> f32) -> Image {
+        let mut image = Image::new(self.width, self.height, 3);
+        for y in 0..self.height - step.1 {
+            for x in 0..self.width - step.0 {
+                let ((near, i), (far, j)) = (self.at(x, y), self.at(x + step.0, y + step.1));
+                let pixel = image.pixel_mut(x, y);
+                pixel
+                    .iter_mut()
+                    .enumerate()
+                    .for_each(|(c, slot)| *slot = value(near, i, true, c) + value(far, j, false, c));
+            }
+        }
+        image
+    }
+}

@@ -1,0 +1,53 @@
+//! Frames as single-part EXR files with a channel per layer component, and back.
+
+use std::path::Path;
+
+use super::{Frame, Layer};
+use crate::error::{Error, Result};
+use crate::image::Image;
+use crate::image::io::{Kind, Pixels, read, write};
+
+/// Header attributes that are carried from frame to frame.
+pub const ATTRIBUTES: &[&str] = &[
+    "fluxion:version",
+    "fluxion:scene",
+    "fluxion:fingerprint",
+    "fluxion:seed",
+    "fluxion:spp",
+    "fluxion:seconds",
+    "fluxion:method",
+    "fluxion:plan",
+];
+
+/// Writes every layer of a frame, without loss.
+pub fn save(path: &Path, frame: &Frame) -> Result<()> {
+    let present: Vec<_> = frame.present().collect();
+    let channels: Vec<String> = present.iter().flat_map(|(layer, _)| layer.channel_names()).collect();
+    let mut data = Vec::with_capacity(frame.width * frame.height * channels.len());
+    for pixel in 0..frame.width * frame.height {
+        for (_, image) in &present {
+            data.extend_from_slice(&image.data[pixel * image.channels..(pixel + 1) * image.channels]);
+        }
+    }
+    let (width, height, attributes) = (frame.width, frame.height, frame.attributes.clone());
+    write(path, &Pixels { width, height, channels, data, eight_bit: false, attributes }, Kind::Float, Some("zips"))
+}
+
+/// Reads the layers that a file has. Channels that belong to no layer are left aside.
+pub fn load(path: &Path) -> Result<Frame> {
+    let pixels = read(path, ATTRIBUTES)?;
+    let mut frame = Frame::new(pixels.width, pixels.height);
+    for layer in Layer::all() {
+        let find = |name: &String| pixels.channels.iter().position(|other| other == name);
+        let Some(positions) = layer.channel_names().iter().map(find).collect::<Option<Vec<_>>>() else { continue };
+        let samples = pixels.data.chunks_exact(pixels.channels.len());
+        let data = samples.flat_map(|pixel| positions.iter().map(|&position| pixel[position])).collect();
+        let image = Image { width: pixels.width, height: pixels.height, channels: positions.len(), data };
+        frame.set(layer, image);
+    }
+    if frame.get(Layer::Color).is_none() {
+        return Err(Error::io(path, format!("no channels R, G, B among {}", pixels.channels.join(", "))));
+    }
+    frame.attributes = pixels.attributes;
+    Ok(frame)
+}

@@ -1,0 +1,87 @@
+//! Image files, through OpenImageIO: colour images in and out, with the encoding each format expects.
+
+use std::path::Path;
+
+use super::Image;
+use crate::error::{Error, Result};
+pub use crate::ffi::oiio::{Kind, Pixels, read, write};
+use crate::math::srgb_encode;
+
+/// Formats that hold linear radiance as floats.
+const LINEAR: &[&str] = &["exr", "hdr", "pfm"];
+/// Formats that hold display-encoded eight-bit colour.
+const ENCODED: &[&str] = &["png", "jpg", "jpeg"];
+
+fn extension(path: &Path) -> String {
+    path.extension().unwrap_or_default().to_string_lossy().to_lowercase()
+}
+
+/// Fails on an extension that [`write_color`] cannot write, so that it can be found out before the work.
+pub fn check_writable(path: &Path) -> Result<()> {
+    let extension = extension(path);
+    if LINEAR.contains(&extension.as_str()) || ENCODED.contains(&extension.as_str()) {
+        return Ok(());
+    }
+    let formats = [LINEAR, ENCODED].concat().join(", ");
+    Err(Error::io(path, format!("the extension `{extension}` is not one of {formats}")))
+}
+
+/// Writes a linear RGB image: as it is to exr, hdr and pfm; clamped and sRGB-encoded to png and jpg.
+pub fn write_color(path: &Path, image: &Image, attributes: &[(String, String)]) -> Result<()> {
+    check_writable(path)?;
+    let encoded = ENCODED.contains(&extension(path).as_str());
+    let encode = |&value: &f32| srgb_encode(value.clamp(0.0, 1.0));
+    let data = if encoded { image.data.iter().map(encode).collect() } else { image.data.clone() };
+    let pixels = Pixels {
+        width: image.width,
+        height: image.height,
+        channels: ["R", "G", "B"].map(String::from).to_vec(),
+        data,
+        eight_bit: encoded,
+        attributes: attributes.to_vec(),
+    };
+    let exr = extension(path) == "exr";
+    write(path, &pixels, if encoded { Kind::Uint8 } else { Kind::Float }, exr.then_some("zips"))
+}
+
+/// Reads the R, G and B channels of a linear image (or its single channel, as grey). Eight-bit files are
+/// decoded from sRGB.
+pub fn read_color(path: &Path) -> Result<Image> {
+    let pixels = read(path, &[])?;
+    let wanted = match pixels.channels.as_slice() {
+        [_] => [0; 3],
+        names => {
+            let find = |name: &str| names.iter().position(|other| other.eq_ignore_ascii_case(name));
+            match (find("R"), find("G"), find("B")) {
+                (Some(r), Some(g), Some(b)) => [r, g, b],
+                _ => return Err(Error::io(path, format!("no channels R, G, B among {}", names.join(", ")))),
+            }
+        }
+    };
+    let decode = |value: f32| if pixels.eight_bit { crate::math::srgb_decode(value) } else { value };
+    let count = pixels.channels.len();
+    let data = pixels.data.chunks_exact(count).flat_map(|pixel| wanted.map(|c| decode(pixel[c]))).collect();
+    Ok(Image { width: pixels.width, height: pixels.height, channels: 3, data })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::vec3;
+
+    #[test]
+    fn every_format_gives_back_what_it_can_hold() {
+        let image = Image::from_rgb(5, 3, |x, y| vec3(x as f32 / 5.0, y as f32 / 3.0, 0.5));
+        let folder = tempfile::tempdir().unwrap();
+        for (name, tolerance) in [("a.exr", 0.0), ("a.hdr", 0.01), ("a.png", 0.01), ("a.jpg", 0.2), ("a.pfm", 0.0)] {
+            let path = folder.path().join(name);
+            write_color(&path, &image, &[]).unwrap();
+            let back = read_color(&path).unwrap();
+            assert_eq!(back.shape(), image.shape());
+            let worst = back.data.iter().zip(&image.data).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+            assert!(worst <= tolerance, "{name}: {worst}");
+        }
+        let error = write_color(&folder.path().join("a.xyz"), &image, &[]).unwrap_err();
+        assert!(error.to_string().contains("not one of exr"), "{error}");
+    }
+}

@@ -1,0 +1,78 @@
+//! Images of floats: rows from the top, channels interleaved.
+
+pub mod io;
+
+use crate::math::{Rgb, vec3};
+
+/// `width * height` pixels of `channels` floats each.
+#[derive(Clone, Debug, PartialEq, Default)]
+pub struct Image {
+    /// Pixels in a row.
+    pub width: usize,
+    /// Number of rows.
+    pub height: usize,
+    /// Floats in a pixel.
+    pub channels: usize,
+    /// All samples; pixel (x, y) starts at `(y * width + x) * channels`.
+    pub data: Vec<f32>,
+}
+
+impl Image {
+    /// An image of zeros.
+    pub fn new(width: usize, height: usize, channels: usize) -> Self {
+        Self { width, height, channels, data: vec![0.0; width * height * channels] }
+    }
+
+    /// An RGB image from a function of x and y.
+    pub fn from_rgb(width: usize, height: usize, mut pixel: impl FnMut(usize, usize) -> Rgb) -> Self {
+        let mut data = Vec::with_capacity(width * height * 3);
+        for y in 0..height {
+            for x in 0..width {
+                data.extend_from_slice(&pixel(x, y).to_array());
+            }
+        }
+        Self { width, height, channels: 3, data }
+    }
+
+    /// Whether there is no pixel.
+    pub fn is_empty(&self) -> bool {
+        self.width * self.height == 0
+    }
+
+    /// The samples of one pixel.
+    pub fn pixel(&self, x: usize, y: usize) -> &[f32] {
+        let at = (y * self.width + x) * self.channels;
+        &self.data[at..at + self.channels]
+    }
+
+    /// The samples of one pixel, to write.
+    pub fn pixel_mut(&mut self, x: usize, y: usize) -> &mut [f32] {
+        let at = (y * self.width + x) * self.channels;
+        &mut self.data[at..at + self.channels]
+    }
+
+    /// A pixel as a colour; an image of one channel is grey.
+    pub fn rgb(&self, x: usize, y: usize) -> Rgb {
+        match self.pixel(x, y) {
+            [r, g, b, ..] => vec3(*r, *g, *b),
+            [grey, ..] => Rgb::splat(*grey),
+            [] => Rgb::ZERO,
+        }
+    }
+
+    /// Channel `c` as doubles, row by row.
+    pub fn channel(&self, c: usize) -> Vec<f64> {
+        self.data.iter().skip(c).step_by(self.channels).map(|&value| f64::from(value)).collect()
+    }
+
+    /// Adds `other`, of the same shape, sample by sample.
+    pub fn add(&mut self, other: &Self) {
+        debug_assert_eq!((self.width, self.height, self.channels), (other.width, other.height, other.channels));
+        self.data.iter_mut().zip(&other.data).for_each(|(sum, value)| *sum += value);
+    }
+
+    /// Width, height and channels, for comparison and messages.
+    pub fn shape(&self) -> (usize, usize, usize) {
+        (self.width, self.height, self.channels)
+    }
+}

@@ -1,0 +1,117 @@
+//! Sampling an index, or a point of a grid, in proportion to given weights.
+
+use super::{Vec2, vec2};
+
+/// A distribution over indices by inversion of its cumulative sum; f64 sums, so that a million entries keep
+/// their shares.
+#[derive(Clone, Debug)]
+pub struct Discrete {
+    /// Running sums, starting with 0 and ending with the total.
+    cumulative: Vec<f64>,
+}
+
+impl Discrete {
+    /// Weights must be finite and not negative. `None` when they sum to zero.
+    pub fn new(weights: impl IntoIterator<Item = f32>) -> Option<Self> {
+        let mut cumulative = vec![0.0];
+        let mut total = 0.0;
+        for weight in weights {
+            total += f64::from(weight);
+            cumulative.push(total);
+        }
+        (total > 0.0 && total.is_finite()).then_some(Self { cumulative })
+    }
+
+    /// Sum of all weights.
+    pub fn total(&self) -> f64 {
+        self.cumulative[self.cumulative.len() - 1]
+    }
+
+    /// The index that `u` in [0, 1) falls on, and `u` stretched to [0, 1) within it for further use.
+    pub fn sample(&self, u: f32) -> (usize, f32) {
+        let target = f64::from(u) * self.total();
+        let last = self.cumulative.len() - 2;
+        let mut index = self.cumulative.partition_point(|&sum| sum <= target).saturating_sub(1).min(last);
+        // Rounding may end on an entry without weight, beside the one that was meant.
+        while index > 0 && self.cumulative[index + 1] == self.cumulative[index] {
+            index -= 1;
+        }
+        let (low, high) = (self.cumulative[index], self.cumulative[index + 1]);
+        let rest = if high > low { (target - low) / (high - low) } else { 0.0 };
+        (index, (rest as f32).clamp(0.0, 1.0 - f32::EPSILON / 2.0))
+    }
+
+    /// Probability of `index`.
+    pub fn probability(&self, index: usize) -> f32 {
+        ((self.cumulative[index + 1] - self.cumulative[index]) / self.total()) as f32
+    }
+}
+
+/// A piecewise-constant density over the unit square, sampled row first.
+#[derive(Clone, Debug)]
+pub struct Grid {
+    rows: Discrete,
+    columns: Vec<Option<Discrete>>,
+    width: usize,
+}
+
+impl Grid {
+    /// Weights of `width` cells a row, row by row. `None` when all are zero.
+    pub fn new(weights: &[f32], width: usize) -> Option<Self> {
+        let columns: Vec<_> = weights.chunks_exact(width).map(|row| Discrete::new(row.iter().copied())).collect();
+        let rows = Discrete::new(columns.iter().map(|row| row.as_ref().map_or(0.0, |row| row.total() as f32)))?;
+        Some(Self { rows, columns, width })
+    }
+
+    /// A point of the unit square and its density.
+    pub fn sample(&self, u: Vec2) -> (Vec2, f32) {
+        let (row, v) = self.rows.sample(u.y);
+        let Some(columns) = &self.columns[row] else { return (Vec2::ZERO, 0.0) };
+        let (column, h) = columns.sample(u.x);
+        let point = vec2((column as f32 + h) / self.width as f32, (row as f32 + v) / self.columns.len() as f32);
+        (point, self.cell_pdf(row, column))
+    }
+
+    /// Density at a point.
+    pub fn pdf(&self, point: Vec2) -> f32 {
+        let cell = |x: f32, n: usize| ((x * n as f32) as usize).min(n - 1);
+        self.cell_pdf(cell(point.y, self.columns.len()), cell(point.x, self.width))
+    }
+
+    fn cell_pdf(&self, row: usize, column: usize) -> f32 {
+        let cells = (self.width * self.columns.len()) as f32;
+        let conditional = self.columns[row].as_ref().map_or(0.0, |columns| columns.probability(column));
+        self.rows.probability(row) * conditional * cells
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shares_are_the_weights_and_empty_entries_are_never_drawn() {
+        let table = Discrete::new([1.0, 0.0, 3.0, 0.0]).unwrap();
+        let n = 4000;
+        let mut counts = [0; 4];
+        for i in 0..n {
+            counts[table.sample(i as f32 / n as f32).0] += 1;
+        }
+        assert_eq!(counts, [1000, 0, 3000, 0]);
+        assert_eq!(table.sample(1.0).0, 2);
+        assert_eq!((table.probability(2), table.probability(3)), (0.75, 0.0));
+        assert!(Discrete::new([0.0, 0.0]).is_none());
+    }
+
+    #[test]
+    fn grid_density_integrates_to_one_and_agrees_with_its_samples() {
+        let grid = Grid::new(&[1.0, 2.0, 0.0, 0.0, 0.0, 5.0], 3).unwrap();
+        let mean =
+            (0..6).map(|i| grid.pdf(vec2((i % 3) as f32 / 3.0 + 0.1, (i / 3) as f32 / 2.0 + 0.1))).sum::<f32>() / 6.0;
+        assert!((mean - 1.0).abs() < 1e-6);
+        for i in 0..100 {
+            let (point, pdf) = grid.sample(vec2((i as f32 * 0.37) % 1.0, (i as f32 * 0.73) % 1.0));
+            assert!(pdf > 0.0 && (grid.pdf(point) - pdf).abs() < 1e-5);
+        }
+    }
+}

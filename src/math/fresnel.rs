@@ -1,0 +1,142 @@
+//! Fresnel equations and the directions they speak of. Local coordinates: the normal is +z, directions point
+//! away from the surface.
+
+use super::{Rgb, Vec3, vec3};
+
+/// What a smooth dielectric interface does with a direction.
+#[derive(Clone, Copy, Debug)]
+pub struct Dielectric {
+    /// Reflected share of unpolarised light, in [0, 1].
+    pub reflectance: f32,
+    /// Cosine of the transmitted direction, with the opposite sign of the incident one; 0 on total reflection.
+    pub cos_t: f32,
+    /// Relative index from the transmitted to the incident side: sin θt = sin θi · eta_ti.
+    pub eta_ti: f32,
+}
+
+/// Fresnel reflectance of a dielectric with relative index `eta` = interior / exterior, seen along a direction
+/// of cosine `cos_i` (negative: from inside).
+pub fn dielectric(cos_i: f32, eta: f32) -> Dielectric {
+    let eta_it = if cos_i >= 0.0 { eta } else { 1.0 / eta };
+    let eta_ti = 1.0 / eta_it;
+    let cos_t_squared = 1.0 - (1.0 - cos_i * cos_i) * eta_ti * eta_ti;
+    if eta == 1.0 {
+        return Dielectric { reflectance: 0.0, cos_t: -cos_i, eta_ti };
+    }
+    if cos_t_squared <= 0.0 {
+        return Dielectric { reflectance: 1.0, cos_t: 0.0, eta_ti };
+    }
+    let (ci, ct) = (cos_i.abs(), cos_t_squared.sqrt());
+    let s = (ci - eta_it * ct) / (ci + eta_it * ct);
+    let p = (ct - eta_it * ci) / (ct + eta_it * ci);
+    Dielectric { reflectance: 0.5 * (s * s + p * p), cos_t: -ct.copysign(cos_i), eta_ti }
+}
+
+/// Fresnel reflectance of a conductor with complex index `eta - i k`, per channel (PBR Book, "Fresnel for
+/// conductors").
+pub fn conductor(cos_i: f32, eta: Rgb, k: Rgb) -> Rgb {
+    let cos2 = cos_i * cos_i;
+    let sin2 = 1.0 - cos2;
+    let channel = |eta: f32, k: f32| {
+        let t0 = eta * eta - k * k - sin2;
+        let a2_plus_b2 = (t0 * t0 + 4.0 * eta * eta * k * k).max(0.0).sqrt();
+        let a = (0.5 * (a2_plus_b2 + t0)).max(0.0).sqrt();
+        let (t1, t2) = (a2_plus_b2 + cos2, 2.0 * a * cos_i);
+        let s = (t1 - t2) / (t1 + t2);
+        let (t3, t4) = (a2_plus_b2 * cos2 + sin2 * sin2, t2 * sin2);
+        let p = s * (t3 - t4) / (t3 + t4);
+        let value = 0.5 * (s + p);
+        // Only 0/0 (a perfect index match at grazing incidence) gets here.
+        if value.is_finite() { value } else { 1.0 }
+    };
+    vec3(channel(eta.x, k.x), channel(eta.y, k.y), channel(eta.z, k.z))
+}
+
+/// Average reflectance of a dielectric interface under diffuse illumination: 2 ∫ R(µ) µ dµ, by 10-point
+/// Gauss-Legendre quadrature on either side of the critical angle.
+pub fn dielectric_diffuse(eta: f32) -> f32 {
+    const NODES: [(f64, f64); 5] = [
+        (0.148_874_338_981_631_2, 0.295_524_224_714_752_9),
+        (0.433_395_394_129_247_2, 0.269_266_719_309_996_4),
+        (0.679_409_568_299_024_4, 0.219_086_362_515_982_04),
+        (0.865_063_366_688_984_5, 0.149_451_349_150_580_6),
+        (0.973_906_528_517_171_7, 0.066_671_344_308_688_14),
+    ];
+    let critical = if eta < 1.0 { (1.0 - eta * eta).sqrt() } else { 0.0 };
+    let part = |low: f32, high: f32| {
+        let (middle, half) = (f64::from(low + high) / 2.0, f64::from(high - low) / 2.0);
+        let value = |mu: f64| f64::from(dielectric(mu as f32, eta).reflectance) * mu;
+        NODES.iter().map(|&(x, w)| w * half * (value(middle - half * x) + value(middle + half * x))).sum::<f64>()
+    };
+    (2.0 * (part(0.0, critical) + part(critical, 1.0))) as f32
+}
+
+/// Mirrors `wi` about +z.
+pub fn reflect(wi: Vec3) -> Vec3 {
+    vec3(-wi.x, -wi.y, wi.z)
+}
+
+/// Mirrors `wi` about the unit vector `m`.
+pub fn reflect_about(wi: Vec3, m: Vec3) -> Vec3 {
+    2.0 * wi.dot(m) * m - wi
+}
+
+/// Refracts `wi` at +z, with what [`dielectric`] found for it.
+pub fn refract(wi: Vec3, cos_t: f32, eta_ti: f32) -> Vec3 {
+    vec3(-eta_ti * wi.x, -eta_ti * wi.y, cos_t)
+}
+
+/// Refracts `wi` at the unit vector `m`.
+pub fn refract_about(wi: Vec3, m: Vec3, cos_t: f32, eta_ti: f32) -> Vec3 {
+    m * (wi.dot(m) * eta_ti + cos_t) - wi * eta_ti
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn dielectric_has_its_closed_values() {
+        assert!((dielectric(1.0, 1.5).reflectance - 0.04).abs() < 1e-6);
+        assert!((dielectric(-1.0, 1.5).reflectance - 0.04).abs() < 1e-6);
+        assert_eq!(dielectric(-0.1, 1.5).reflectance, 1.0);
+        assert_eq!(dielectric(0.3, 1.0).reflectance, 0.0);
+        // Stokes' relation: the same light path seen from its other end is reflected equally.
+        let outside = dielectric(0.6, 1.33);
+        assert!((dielectric(outside.cos_t, 1.33).reflectance - outside.reflectance).abs() < 1e-6);
+    }
+
+    #[test]
+    fn conductor_has_its_closed_values() {
+        let normal = conductor(1.0, Rgb::splat(0.2), Rgb::splat(3.0));
+        let expected = ((0.2f32 - 1.0).powi(2) + 9.0) / ((0.2f32 + 1.0).powi(2) + 9.0);
+        assert!((normal.x - expected).abs() < 1e-6);
+        // Without absorption it is a dielectric.
+        assert!((conductor(0.4, Rgb::splat(1.5), Rgb::ZERO).x - dielectric(0.4, 1.5).reflectance).abs() < 1e-6);
+        assert!((conductor(0.0, Rgb::ONE, Rgb::ZERO).x).is_finite());
+    }
+
+    #[test]
+    fn diffuse_reflectance_agrees_with_fine_quadrature_and_reciprocity() {
+        for eta in [1.0 / 1.5, 1.0 / 1.1, 1.33, 1.5, 2.4f32] {
+            let n = 200_000;
+            let fine: f64 = (0..n)
+                .map(|i| (f64::from(i) + 0.5) / f64::from(n))
+                .map(|mu| 2.0 * f64::from(dielectric(mu as f32, eta).reflectance) * mu / f64::from(n))
+                .sum();
+            assert!((f64::from(dielectric_diffuse(eta)) - fine).abs() < 2e-3, "{eta}: {fine}");
+        }
+        // What enters and what leaves are tied by eta squared.
+        let (into, out) = (1.0 - dielectric_diffuse(1.5), 1.0 - dielectric_diffuse(1.0 / 1.5));
+        assert!((into - out * 1.5 * 1.5).abs() < 2e-3);
+    }
+
+    #[test]
+    fn refraction_obeys_snell() {
+        let wi = vec3(0.6, 0.0, 0.8);
+        let found = dielectric(wi.z, 1.5);
+        let wo = refract(wi, found.cos_t, found.eta_ti);
+        assert!((wo.length() - 1.0).abs() < 1e-6 && (wo.x + 0.4).abs() < 1e-6 && wo.z < 0.0);
+        assert!(refract_about(wi, Vec3::Z, found.cos_t, found.eta_ti).distance(wo) < 1e-6);
+    }
+}

@@ -1,0 +1,75 @@
+//! Maps from the unit square to the domains that are sampled. Each is continuous and has its density beside it.
+
+use std::f32::consts::{FRAC_1_PI, FRAC_PI_2, FRAC_PI_4, PI};
+
+use super::{Vec2, Vec3, vec2, vec3};
+
+/// Uniform on the unit disk (Shirley and Chiu 1997, concentric map).
+pub fn disk(u: Vec2) -> Vec2 {
+    let offset = 2.0 * u - 1.0;
+    if offset == Vec2::ZERO {
+        return Vec2::ZERO;
+    }
+    let (radius, angle) = if offset.x.abs() > offset.y.abs() {
+        (offset.x, FRAC_PI_4 * (offset.y / offset.x))
+    } else {
+        (offset.y, FRAC_PI_2 - FRAC_PI_4 * (offset.x / offset.y))
+    };
+    radius * vec2(angle.cos(), angle.sin())
+}
+
+/// Cosine-weighted on the upper hemisphere; density cos θ / π.
+pub fn cosine_hemisphere(u: Vec2) -> Vec3 {
+    let d = disk(u);
+    vec3(d.x, d.y, (1.0 - d.length_squared()).max(0.0).sqrt())
+}
+
+/// Density of [`cosine_hemisphere`] per solid angle.
+pub fn cosine_hemisphere_pdf(cos: f32) -> f32 {
+    cos.max(0.0) * FRAC_1_PI
+}
+
+/// Uniform on the unit sphere; density 1 / 4π.
+pub fn sphere(u: Vec2) -> Vec3 {
+    let z = 1.0 - 2.0 * u.x;
+    let radius = (1.0 - z * z).max(0.0).sqrt();
+    let angle = 2.0 * PI * u.y;
+    vec3(radius * angle.cos(), radius * angle.sin(), z)
+}
+
+/// Uniform in the cone about +z of which `versine` = 1 - cos of the half angle; density 1 / (2π versine).
+/// Taking 1 - cos keeps narrow cones exact.
+pub fn cone(u: Vec2, versine: f32) -> Vec3 {
+    let height = u.x * versine;
+    let radius = (height * (2.0 - height)).max(0.0).sqrt();
+    let angle = 2.0 * PI * u.y;
+    vec3(radius * angle.cos(), radius * angle.sin(), 1.0 - height)
+}
+
+/// Barycentric weights of the second and third vertex, uniform over a triangle.
+pub fn triangle(u: Vec2) -> Vec2 {
+    let root = (1.0 - u.x).max(0.0).sqrt();
+    vec2(1.0 - root, u.y * root)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Means over a regular grid against the distributions' closed moments.
+    fn mean(f: impl Fn(Vec2) -> f32) -> f32 {
+        let n = 256;
+        let cell = |i: usize| (i as f32 + 0.5) / n as f32;
+        (0..n * n).map(|i| f(vec2(cell(i % n), cell(i / n)))).sum::<f32>() / (n * n) as f32
+    }
+
+    #[test]
+    fn moments_are_those_of_the_distributions() {
+        assert!((mean(|u| disk(u).length_squared()) - 0.5).abs() < 1e-3);
+        assert!((mean(|u| cosine_hemisphere(u).z) - 2.0 / 3.0).abs() < 1e-3);
+        assert!(mean(|u| sphere(u).z).abs() < 1e-3 && (mean(|u| sphere(u).x.powi(2)) - 1.0 / 3.0).abs() < 1e-3);
+        assert!((mean(|u| cone(u, 0.25).z) - 0.875).abs() < 1e-3);
+        assert!((mean(|u| triangle(u).x) - 1.0 / 3.0).abs() < 1e-3);
+        assert!((mean(|u| triangle(u).y) - 1.0 / 3.0).abs() < 1e-3);
+    }
+}

@@ -1,0 +1,26 @@
+//! The mean of the samples: plain path tracing.
+
+use super::{Context, Method, Reconstruction, Solution};
+use crate::error::Result;
+use crate::film::{Frame, Layer, Needs};
+
+/// `primal`.
+pub const METHOD: Method = Method {
+    id: "primal",
+    summary: "the mean of the samples, as path tracing gives it",
+    parameters: &[],
+    make: |_| Ok(Box::new(Primal)),
+};
+
+struct Primal;
+
+impl Reconstruction for Primal {
+    fn needs(&self) -> Needs {
+        Needs::default()
+    }
+
+    fn reconstruct(&self, frame: &Frame, _context: &Context) -> Result<Solution> {
+        let image = frame.require(Layer::Color)?.clone();
+        Ok(Solution { image, error: frame.get(Layer::ColorVariance).cloned() })
+    }
+}

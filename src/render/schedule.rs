@@ -1,0 +1,152 @@
+//! Waves of tiles on all threads, until the samples or the time are used up or someone says stop.
+
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use rayon::prelude::*;
+
+use super::gradient::Tracer;
+use super::{SampleId, sample};
+use crate::film::{Film, Needs, Rejected, Tile};
+use crate::scene::Scene;
+
+/// How much to render.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Budget {
+    /// Samples of every pixel.
+    Spp(u32),
+    /// Wall-clock time; at least one sample is taken of every pixel.
+    Time(Duration),
+}
+
+/// What to render.
+#[derive(Clone, Copy, Debug)]
+pub struct Settings {
+    /// How much.
+    pub budget: Budget,
+    /// Different seeds give independent images.
+    pub seed: u64,
+    /// What to record; edges make it gradient-domain path tracing.
+    pub needs: Needs,
+    /// Smooth lobes rougher than this are reconnected through rather than half-vector copied.
+    pub shift_threshold: f32,
+}
+
+/// Threads between the caller and a render that is under way.
+pub struct Control<'a> {
+    /// Set to end the render after the tiles that are being worked on.
+    pub stop: &'a AtomicBool,
+    /// Told the finished share, in [0, 1].
+    pub progress: &'a (dyn Fn(f32) + Sync),
+}
+
+/// A rendered film and how it went.
+pub struct Outcome {
+    /// The film.
+    pub film: Film,
+    /// Samples of a pixel, where all have the same; else the most.
+    pub spp: u32,
+    /// Wall-clock time.
+    pub elapsed: Duration,
+    /// Whether `stop` ended it early.
+    pub stopped: bool,
+    /// The first sample that was not finite, for `--replay`.
+    pub first_rejected: Option<(SampleId, Rejected)>,
+}
+
+/// Samples that a wave adds to every pixel: few enough for progress and for stopping in time.
+const WAVE: u32 = 8;
+
+/// Renders until the budget is used up.
+pub fn render(scene: &Scene, settings: Settings, control: &Control) -> Outcome {
+    let start = Instant::now();
+    let sensor = scene.sensor();
+    let mut outcome = Outcome {
+        film: Film::new(sensor.width, sensor.height, settings.needs),
+        spp: 0,
+        elapsed: Duration::ZERO,
+        stopped: false,
+        first_rejected: None,
+    };
+    while let Some(wave) = next_wave(settings.budget, outcome.spp, start.elapsed()) {
+        run_wave(scene, settings, control, &mut outcome, wave);
+        outcome.spp += wave;
+        outcome.stopped = control.stop.load(Ordering::Relaxed);
+        if outcome.stopped {
+            break;
+        }
+    }
+    outcome.elapsed = start.elapsed();
+    outcome
+}
+
+/// Samples per pixel of the next wave, none when the budget is used up. A time budget is met by the waves' own
+/// mean speed: the last ones shrink so as not to overshoot.
+fn next_wave(budget: Budget, done: u32, elapsed: Duration) -> Option<u32> {
+    match budget {
+        Budget::Spp(spp) => Some(WAVE.min(spp.saturating_sub(done))).filter(|&wave| wave > 0),
+        Budget::Time(_) if done == 0 => Some(1),
+        Budget::Time(limit) => {
+            let per_sample = elapsed.as_secs_f64() / f64::from(done);
+            let left = limit.as_secs_f64() - elapsed.as_secs_f64();
+            let affordable = (left / per_sample + 0.5) as u32;
+            Some(affordable.min(WAVE).min(done)).filter(|&wave| wave > 0)
+        }
+    }
+}
+
+fn run_wave(scene: &Scene, settings: Settings, control: &Control, outcome: &mut Outcome, wave: u32) {
+    let first_rejected = Mutex::new(outcome.first_rejected);
+    let (spp, tiles) = (outcome.spp, outcome.film.tiles_mut());
+    let (total, done) = (tiles.len(), Mutex::new(0));
+    tiles.par_iter_mut().for_each(|tile| {
+        if control.stop.load(Ordering::Relaxed) {
+            return;
+        }
+        if let Some(rejected) = run_tile(scene, settings, tile, wave) {
+            let mut first = first_rejected.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+            first.get_or_insert(rejected);
+        }
+        let mut done = done.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        *done += 1;
+        if let Budget::Spp(all) = settings.budget {
+            (control.progress)((spp as f32 + wave as f32 * *done as f32 / total as f32) / all as f32);
+        }
+    });
+    outcome.first_rejected = first_rejected.into_inner().unwrap_or_else(|poisoned| poisoned.into_inner());
+}
+
+fn run_tile(scene: &Scene, settings: Settings, tile: &mut Tile, wave: u32) -> Option<(SampleId, Rejected)> {
+    let mut tracer = settings.needs.edges.then(|| Tracer::new(settings.shift_threshold));
+    let mut first_rejected = None;
+    for _ in 0..wave {
+        for pixel in 0..tile.width * tile.height {
+            let (x, y) = (tile.x + pixel % tile.width, tile.y + pixel / tile.width);
+            let id = SampleId { seed: settings.seed, x, y, index: tile.count(pixel) };
+            if let Err(reason) = tile.add(pixel, &sample(scene, id, tracer.as_mut())) {
+                first_rejected.get_or_insert((id, reason));
+            }
+        }
+    }
+    first_rejected
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn waves_add_up_to_the_samples_and_stay_within_the_time() {
+        let mut done = 0;
+        while let Some(wave) = next_wave(Budget::Spp(21), done, Duration::ZERO) {
+            done += wave;
+        }
+        assert_eq!(done, 21);
+        let limit = Budget::Time(Duration::from_secs(10));
+        assert_eq!(next_wave(limit, 0, Duration::from_secs(60)), Some(1));
+        assert_eq!(next_wave(limit, 4, Duration::from_secs(4)), Some(4));
+        assert_eq!(next_wave(limit, 9, Duration::from_secs(9)), Some(1));
+        assert_eq!(next_wave(limit, 10, Duration::from_secs(10)), None);
+    }
+}

@@ -1,0 +1,73 @@
+//! A material with holes: where it is not opaque, light goes straight through.
+
+use std::sync::Arc;
+
+use super::{Bsdf, BsdfSample, Delta, Eval, Lobe};
+use crate::error::Result;
+use crate::math::{Rgb, Vec2, Vec3};
+use crate::scene::Surface;
+use crate::scene::load::props::Object;
+use crate::scene::load::{Loader, Plugin};
+use crate::scene::texture::Texture;
+
+/// `mask`. Shadow rays do not see through: what lies behind is found by the paths that go through.
+pub const PLUGIN: Plugin<Arc<dyn Bsdf>> = Plugin { name: "mask", parameters: "opacity, one nested bsdf", make };
+
+fn make(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Bsdf>> {
+    let opacity = loader.texture(object, "opacity", Rgb::splat(0.5))?;
+    Ok(Arc::new(Mask { opacity, nested: loader.nested_bsdf(object)? }))
+}
+
+struct Mask {
+    opacity: Arc<dyn Texture>,
+    nested: Arc<dyn Bsdf>,
+}
+
+impl Mask {
+    fn opacity(&self, surface: &Surface) -> f32 {
+        self.opacity.scalar(surface.uv).clamp(0.0, 1.0)
+    }
+}
+
+impl Bsdf for Mask {
+    fn sample(&self, surface: &Surface, wi: Vec3, lobe: f32, u: Vec2) -> Option<BsdfSample> {
+        let opacity = self.opacity(surface);
+        if lobe < opacity {
+            let sample = self.nested.sample(surface, wi, lobe / opacity, u)?;
+            return Some(BsdfSample { pdf: sample.pdf * opacity, ..sample });
+        }
+        Some(BsdfSample { wo: -wi, weight: Rgb::ONE, pdf: 1.0 - opacity, lobe: Lobe::Null, eta: 1.0 })
+    }
+
+    fn eval(&self, surface: &Surface, wi: Vec3, wo: Vec3) -> Eval {
+        let opacity = self.opacity(surface);
+        let Eval { value, pdf } = self.nested.eval(surface, wi, wo);
+        Eval { value: value * opacity, pdf: pdf * opacity }
+    }
+
+    fn delta(&self, surface: &Surface, wi: Vec3, lobe: Lobe) -> Option<Delta> {
+        let opacity = self.opacity(surface);
+        if lobe == Lobe::Null {
+            let through = 1.0 - opacity;
+            return (through > 0.0).then_some(Delta { wo: -wi, value: Rgb::splat(through), probability: through });
+        }
+        let Delta { wo, value, probability } = self.nested.delta(surface, wi, lobe)?;
+        (opacity > 0.0).then_some(Delta { wo, value: value * opacity, probability: probability * opacity })
+    }
+
+    fn roughness(&self, surface: &Surface) -> Option<f32> {
+        self.nested.roughness(surface).filter(|_| self.opacity(surface) > 0.0)
+    }
+
+    fn albedo(&self, surface: &Surface) -> Rgb {
+        self.nested.albedo(surface)
+    }
+
+    fn transmits(&self) -> bool {
+        true
+    }
+
+    fn needs_derivatives(&self) -> bool {
+        self.nested.needs_derivatives()
+    }
+}

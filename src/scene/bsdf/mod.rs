@@ -1,0 +1,179 @@
+//! Materials. Directions are local (the shading normal is +z) and point away from the surface; `wi` is where the
+//! path came from, `wo` where it goes.
+
+mod bumpmap;
+mod conductor;
+mod dielectric;
+mod diffuse;
+mod mask;
+pub mod microfacet;
+mod plastic;
+mod roughconductor;
+mod roughplastic;
+mod thindielectric;
+mod twosided;
+
+use std::sync::Arc;
+
+use super::Surface;
+use super::load::Plugin;
+use super::load::props::{Object, Property, Value};
+use crate::error::Result;
+use crate::math::{Rgb, Vec2, Vec3};
+
+/// The BSDFs of scene files.
+pub const PLUGINS: &[Plugin<Arc<dyn Bsdf>>] = &[
+    diffuse::PLUGIN,
+    conductor::PLUGIN,
+    roughconductor::PLUGIN,
+    dielectric::PLUGIN,
+    thindielectric::PLUGIN,
+    plastic::PLUGIN,
+    roughplastic::PLUGIN,
+    twosided::PLUGIN,
+    mask::PLUGIN,
+    bumpmap::PLUGIN,
+];
+
+/// The material of a shape that names none.
+pub fn default() -> Arc<dyn Bsdf> {
+    diffuse::grey()
+}
+
+/// The kinds of scattering that are told apart when a path is replayed elsewhere.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Lobe {
+    /// Spread over solid angle.
+    Smooth,
+    /// Mirror direction only.
+    DeltaReflect,
+    /// Refracted direction only.
+    DeltaTransmit,
+    /// Straight through, unscattered.
+    Null,
+}
+
+impl Lobe {
+    /// Whether the lobe has a single direction.
+    pub fn is_delta(self) -> bool {
+        self != Self::Smooth
+    }
+}
+
+/// A sampled direction.
+#[derive(Clone, Copy, Debug)]
+pub struct BsdfSample {
+    /// Outgoing direction.
+    pub wo: Vec3,
+    /// f |cos θo| / pdf, of all smooth lobes together or of the one delta lobe.
+    pub weight: Rgb,
+    /// Density per solid angle, or probability of a delta lobe.
+    pub pdf: f32,
+    /// The lobe.
+    pub lobe: Lobe,
+    /// Relative index of refraction along the new direction: 1 unless refracted.
+    pub eta: f32,
+}
+
+/// The smooth lobes in a pair of directions.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Eval {
+    /// f |cos θo|.
+    pub value: Rgb,
+    /// Density per solid angle with which `sample` gives `wo`, delta lobes' share taken off.
+    pub pdf: f32,
+}
+
+/// What a delta lobe does with a direction.
+#[derive(Clone, Copy, Debug)]
+pub struct Delta {
+    /// Its one outgoing direction.
+    pub wo: Vec3,
+    /// Factor on radiance.
+    pub value: Rgb,
+    /// Probability with which `sample` chooses it.
+    pub probability: f32,
+}
+
+/// Scattering at a surface.
+pub trait Bsdf: Send + Sync {
+    /// Draws a direction from the lobe number `lobe` in [0, 1) and `u`. `None` absorbs.
+    fn sample(&self, surface: &Surface, wi: Vec3, lobe: f32, u: Vec2) -> Option<BsdfSample>;
+
+    /// The smooth lobes.
+    fn eval(&self, surface: &Surface, wi: Vec3, wo: Vec3) -> Eval;
+
+    /// What a delta lobe does; `None` when it is absent or cannot happen.
+    fn delta(&self, _surface: &Surface, _wi: Vec3, _lobe: Lobe) -> Option<Delta> {
+        None
+    }
+
+    /// Smallest roughness (Beckmann or GGX alpha) of the smooth lobes, infinite for diffuse ones; `None` without
+    /// smooth lobes.
+    fn roughness(&self, surface: &Surface) -> Option<f32>;
+
+    /// Overall colour in [0, 1], the same from everywhere: the albedo feature.
+    fn albedo(&self, surface: &Surface) -> Rgb;
+
+    /// Whether light can pass to the other side.
+    fn transmits(&self) -> bool {
+        false
+    }
+
+    /// Whether surfaces need dp_du and dp_dv.
+    fn needs_derivatives(&self) -> bool {
+        false
+    }
+}
+
+/// The default interior of plastics.
+const POLYPROPYLENE: f32 = 1.49;
+/// The default interior of glass.
+const BK7: f32 = 1.5046;
+
+/// Indices of refraction by name.
+const IOR: &[(&str, f32)] = &[
+    ("vacuum", 1.0),
+    ("helium", 1.000_036),
+    ("hydrogen", 1.000_132),
+    ("air", 1.000_277),
+    ("carbon dioxide", 1.000_45),
+    ("water", 1.333),
+    ("acetone", 1.36),
+    ("ethanol", 1.361),
+    ("carbon tetrachloride", 1.461),
+    ("glycerol", 1.4729),
+    ("benzene", 1.501),
+    ("silicone oil", 1.520_45),
+    ("bromine", 1.661),
+    ("water ice", 1.31),
+    ("fused quartz", 1.458),
+    ("pyrex", 1.47),
+    ("acrylic glass", 1.49),
+    ("polypropylene", POLYPROPYLENE),
+    ("bk7", BK7),
+    ("sodium chloride", 1.544),
+    ("amber", 1.55),
+    ("pet", 1.575),
+    ("diamond", 2.419),
+];
+
+fn ior(object: &Object, name: &str, default: f32) -> Result<f32> {
+    if let Some(Property { value: Value::String(material), place, .. }) = object.get(name) {
+        let found = IOR.iter().find(|(known, _)| known.eq_ignore_ascii_case(material));
+        let names = || IOR.iter().map(|(known, _)| *known).collect::<Vec<_>>().join(", ");
+        let unknown = || place.unsupported(format!("`{material}` is no known material; there are {}", names()));
+        return found.map(|(_, ior)| *ior).ok_or_else(unknown);
+    }
+    let value = object.float(name, default)?;
+    if value > 0.0 && value.is_finite() {
+        Ok(value)
+    } else {
+        Err(object.place_of(name).invalid(format!("`{name}` must be positive")))
+    }
+}
+
+/// Interior over exterior index of refraction.
+fn relative_ior(object: &Object, default_interior: f32) -> Result<f32> {
+    Ok(ior(object, "int_ior", default_interior)? / ior(object, "ext_ior", 1.000_277)?)
+}

@@ -1,0 +1,49 @@
+//! A shape that glows on its outside.
+
+use std::f32::consts::PI;
+use std::sync::Arc;
+
+use super::{Emitter, LightPoint, Position};
+use crate::math::{Rgb, Vec2, Vec3};
+use crate::scene::shape::Geometry;
+use crate::scene::texture::Texture;
+
+/// Equal radiance in every direction on the side of the normal.
+pub struct Area {
+    geometry: Arc<Geometry>,
+    radiance: Arc<dyn Texture>,
+    /// Number of the shape.
+    pub instance: u32,
+}
+
+impl Area {
+    /// A glowing shape.
+    pub fn new(geometry: Arc<Geometry>, radiance: Arc<dyn Texture>, instance: u32) -> Self {
+        Self { geometry, radiance, instance }
+    }
+}
+
+impl Emitter for Area {
+    fn sample(&self, from: Vec3, u: Vec2) -> Option<LightPoint> {
+        self.geometry.sample(from, u)
+    }
+
+    fn pdf(&self, from: Vec3, point: &LightPoint) -> f32 {
+        self.geometry.pdf(from, point)
+    }
+
+    fn radiance(&self, point: &LightPoint, direction: Vec3) -> Rgb {
+        match point.position {
+            Position::Surface { n, .. } if n.dot(direction) > 0.0 => self.radiance.color(point.uv),
+            _ => Rgb::ZERO,
+        }
+    }
+
+    fn power(&self) -> f32 {
+        PI * self.geometry.area() * self.radiance.mean().max(0.0)
+    }
+
+    fn name(&self) -> &'static str {
+        "area"
+    }
+}

@@ -1,0 +1,116 @@
+//! A latitude-longitude image around the scene. Row 0 is +y; column 0 is -z, and +x is a quarter to its right.
+
+use std::f32::consts::{FRAC_1_PI, PI, TAU};
+use std::sync::Arc;
+
+use super::{Emitter, LightPoint, Position};
+use crate::error::Result;
+use crate::math::discrete::Grid;
+use crate::math::{Mat4, Rgb, Vec2, Vec3, luminance, vec2, vec3};
+use crate::scene::Bounds;
+use crate::scene::load::props::Object;
+use crate::scene::load::{Loader, Plugin};
+use crate::scene::texture::Texels;
+
+/// `envmap`.
+pub const PLUGIN: Plugin<Box<dyn Emitter>> = Plugin { name: "envmap", parameters: "filename, scale, to_world", make };
+
+fn make(object: &Object, loader: &mut Loader) -> Result<Box<dyn Emitter>> {
+    let scale = object.float("scale", 1.0)?;
+    let to_world = object.transform("to_world")?;
+    let texels = {
+        let path = loader.file(object)?;
+        loader.texels(path)?
+    };
+    if texels.width < 2 || texels.height < 3 {
+        return Err(object.place_of("filename").invalid("an environment needs at least 2x3 pixels"));
+    }
+    Ok(Box::new(EnvMap::new(texels, scale, to_world)))
+}
+
+struct EnvMap {
+    texels: Arc<Texels>,
+    scale: f32,
+    to_world: Mat4,
+    to_local: Mat4,
+    /// Density over the unit square; `None` for a black image.
+    grid: Option<Grid>,
+    /// Mean luminance over directions.
+    mean: f32,
+    area: f32,
+}
+
+impl EnvMap {
+    fn new(texels: Arc<Texels>, scale: f32, to_world: Mat4) -> Self {
+        let (width, height) = (texels.width, texels.height);
+        let mut weights = vec![0.0; width * height];
+        let value = |x: usize, y: usize| luminance(texels.texel(x % width, y, false)).max(0.0);
+        for y in 0..height {
+            let sine = (PI * (y as f32 + 0.5) / height as f32).sin();
+            let (above, below) = (y.saturating_sub(1), (y + 1).min(height - 1));
+            for x in 0..width {
+                // A cell is lit through interpolation by its neighbours too.
+                let cross = value(x, above) + value(x, below) + value(x + width - 1, y) + value(x + 1, y);
+                weights[y * width + x] = (0.5 * value(x, y) + 0.125 * cross) * sine;
+            }
+        }
+        let sines: f32 = (0..height).map(|y| (PI * (y as f32 + 0.5) / height as f32).sin()).sum();
+        let total: f64 = weights.iter().map(|&w| f64::from(w)).sum();
+        let mean = (total / (f64::from(sines) * width as f64)) as f32 * scale;
+        let to_local = to_world.inverse();
+        Self { texels, scale, to_world, to_local, grid: Grid::new(&weights, width), mean, area: 1.0 }
+    }
+
+    fn uv(&self, direction: Vec3) -> Vec2 {
+        let d = self.to_local.transform_vector3(direction).normalize_or(Vec3::Y);
+        vec2((d.x.atan2(-d.z) / TAU).rem_euclid(1.0), d.y.clamp(-1.0, 1.0).acos() * FRAC_1_PI)
+    }
+
+    /// Columns have their centres at half numbers and wrap around; the first and last row are the poles.
+    fn look_up(&self, uv: Vec2) -> Rgb {
+        let (width, height) = (self.texels.width, self.texels.height);
+        let at = vec2(uv.x * width as f32 - 0.5, uv.y * (height - 1) as f32);
+        let (x, y) = (at.x.floor(), (at.y as usize).min(height - 2));
+        let wrap = |x: f32| (x as i64).rem_euclid(width as i64) as usize;
+        let (left, right) = (wrap(x), wrap(x + 1.0));
+        let row = |y| self.texels.texel(left, y, false).lerp(self.texels.texel(right, y, false), at.x - x);
+        row(y).lerp(row(y + 1), at.y - y as f32) * self.scale
+    }
+}
+
+impl Emitter for EnvMap {
+    fn sample(&self, _from: Vec3, u: Vec2) -> Option<LightPoint> {
+        let (uv, _) = self.grid.as_ref()?.sample(u);
+        let (sin_phi, cos_phi) = (TAU * uv.x).sin_cos();
+        let (sin, cos) = (PI * uv.y).sin_cos();
+        let direction = self.to_world.transform_vector3(vec3(sin_phi * sin, cos, -cos_phi * sin));
+        Some(LightPoint::at_infinity(direction.normalize(), 0))
+    }
+
+    fn pdf(&self, _from: Vec3, point: &LightPoint) -> f32 {
+        let (Position::Infinity { direction }, Some(grid)) = (point.position, &self.grid) else { return 0.0 };
+        let uv = self.uv(direction);
+        let sine = (PI * uv.y).sin().max(1e-6);
+        grid.pdf(uv) / (2.0 * PI * PI * sine)
+    }
+
+    fn radiance(&self, point: &LightPoint, _direction: Vec3) -> Rgb {
+        match point.position {
+            Position::Infinity { direction } => self.look_up(self.uv(direction)),
+            Position::Surface { .. } => Rgb::ZERO,
+        }
+    }
+
+    fn power(&self) -> f32 {
+        4.0 * PI * self.area * self.mean.max(0.0)
+    }
+
+    fn enclose(&mut self, scene: Bounds) {
+        let (_, radius) = scene.sphere();
+        self.area = PI * radius * radius;
+    }
+
+    fn name(&self) -> &'static str {
+        "envmap"
+    }
+}

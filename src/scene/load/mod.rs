@@ -1,0 +1,336 @@
+//! Scene files to a [`Scene`]: `xml` reads the text into objects, the plugin tables of the sibling folders turn
+//! objects into what they describe. Everything that can fail fails here.
+
+mod obj;
+mod ply;
+pub mod props;
+mod serialized;
+mod transform;
+mod xml;
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+use std::rc::Rc;
+use std::sync::Arc;
+
+use self::props::{Object, Property, Value};
+use super::bsdf::{self, Bsdf};
+use super::emitter::{self, Emitter};
+use super::shape::{self, Geometry};
+use super::texture::{self, Texture};
+use super::{Instance, Integrator, Parts, Scene, sensor};
+use crate::error::{Error, Place, Result};
+use crate::math::{Rgb, Vec2, Vec3, rng, vec3};
+
+/// Nesting deeper than this (a BSDF in a BSDF in ...) is taken for a loop of references.
+const MAX_NESTING: usize = 32;
+/// Films with more pixels than this are taken for a mistake.
+const MAX_PIXELS: u64 = 1 << 28;
+
+/// What the command line may say about a scene before it is read.
+#[derive(Clone, Debug, Default)]
+pub struct Options {
+    /// Values for the file's `$name` parameters, over its `<default>`s.
+    pub parameters: Vec<(String, String)>,
+    /// Film size in place of the file's.
+    pub size: Option<(usize, usize)>,
+    /// Threads for building (0: all).
+    pub threads: usize,
+}
+
+/// A mesh as files give it, before it is placed in the world. Normals and texture coordinates are empty or
+/// there for every vertex; triangles only name vertices that exist.
+#[derive(Clone, Debug, Default)]
+pub struct MeshData {
+    /// Vertex positions.
+    pub positions: Vec<Vec3>,
+    /// Vertex normals, of any length.
+    pub normals: Vec<Vec3>,
+    /// Texture coordinates.
+    pub uvs: Vec<Vec2>,
+    /// Vertex numbers, counter-clockwise seen from outside.
+    pub triangles: Vec<[u32; 3]>,
+}
+
+/// One row of a plugin table: a `type`, what it is, what it takes and how it is made.
+pub struct Plugin<T: 'static> {
+    /// The `type` in scene files.
+    pub name: &'static str,
+    /// Its properties, for messages and documentation.
+    pub parameters: &'static str,
+    /// Builds it from its object.
+    pub make: fn(&Object, &mut Loader) -> Result<T>,
+}
+
+/// Builds objects, each shared one once.
+pub struct Loader {
+    tree: xml::Tree,
+    bsdfs: HashMap<*const Object, Arc<dyn Bsdf>>,
+    textures: HashMap<*const Object, Arc<dyn Texture>>,
+    bitmaps: HashMap<PathBuf, Arc<texture::Texels>>,
+    meshes: HashMap<PathBuf, Arc<Vec<u8>>>,
+    nesting: usize,
+}
+
+/// Loads a scene file with everything it refers to.
+pub fn load(path: &Path, options: &Options) -> Result<Scene> {
+    let tree = xml::parse(path, &options.parameters)?;
+    let objects = tree.objects.clone();
+    let fingerprint =
+        tree.sources.iter().flat_map(|source| source.bytes()).fold(0, |h, b| rng::combine(h, u64::from(b)));
+    let mut loader = Loader {
+        tree,
+        bsdfs: HashMap::new(),
+        textures: HashMap::new(),
+        bitmaps: HashMap::new(),
+        meshes: HashMap::new(),
+        nesting: 0,
+    };
+    let mut instances = Vec::new();
+    let mut emitters: Vec<(Box<dyn Emitter>, bool)> = Vec::new();
+    let (mut sensor, mut integrator) = (None, None);
+    for object in &objects {
+        match object.class.as_str() {
+            "shape" => loader.shape(object, &mut instances, &mut emitters)?,
+            "emitter" => {
+                let plugin = find(emitter::PLUGINS, object)?;
+                let emitter = (plugin.make)(object, &mut loader)?;
+                object.all_used(plugin.parameters)?;
+                emitters.push((emitter, true));
+            }
+            "sensor" if sensor.is_some() => {
+                return Err(object.place.unsupported("a second sensor; a scene has one"));
+            }
+            "sensor" => sensor = Some(sensor::load(object, &mut loader, options.size, MAX_PIXELS)?),
+            "integrator" => integrator = Some(integrator_settings(object)?),
+            // Named materials that no shape uses are allowed, and need not even be understood.
+            "bsdf" | "texture" => {}
+            other => {
+                let known = "shape, bsdf, texture, emitter, sensor, integrator";
+                return Err(object.place.unsupported(format!("<{other}> in a scene; there are {known}")));
+            }
+        }
+    }
+    let place = Place::file(path);
+    let sensor = sensor.ok_or_else(|| place.invalid("the scene has no sensor"))?;
+    let parts = Parts { instances, emitters, sensor, integrator: integrator.unwrap_or_default(), fingerprint };
+    Scene::build(parts, options.threads).map_err(|error| match error {
+        Error::Usage(what) => place.invalid(what),
+        other => other,
+    })
+}
+
+fn integrator_settings(object: &Object) -> Result<Integrator> {
+    if object.plugin != "path" {
+        let what = format!("integrator `{}`; every scene is path traced, so use `path`", object.plugin);
+        return Err(object.place.unsupported(what));
+    }
+    let defaults = Integrator::default();
+    let depth = object.integer("max_depth", -1)?;
+    let max_depth = if depth < 0 { u32::MAX } else { u32::try_from(depth).unwrap_or(u32::MAX) };
+    let rr_depth = object.integer("rr_depth", i64::from(defaults.rr_depth))?;
+    let rr_depth = u32::try_from(rr_depth).ok().filter(|&depth| depth > 0);
+    let rr_depth = rr_depth.ok_or_else(|| object.place_of("rr_depth").invalid("`rr_depth` must be at least 1"))?;
+    if object.boolean("hide_emitters", false)? {
+        return Err(object.place_of("hide_emitters").unsupported("`hide_emitters`; emitters are always visible"));
+    }
+    object.all_used("max_depth, rr_depth, hide_emitters (false)")?;
+    Ok(Integrator { max_depth, rr_depth })
+}
+
+/// The table's row for an object, or an error that lists the table.
+pub fn find<'a, T>(table: &'a [Plugin<T>], object: &Object) -> Result<&'a Plugin<T>> {
+    table.iter().find(|plugin| plugin.name == object.plugin).ok_or_else(|| {
+        let names: Vec<_> = table.iter().map(|plugin| plugin.name).collect();
+        let what = format!("{} `{}` is not known; there are {}", object.class, object.plugin, names.join(", "));
+        object.place.unsupported(what)
+    })
+}
+
+impl Loader {
+    fn shape(
+        &mut self,
+        object: &Object,
+        instances: &mut Vec<Instance>,
+        emitters: &mut Vec<(Box<dyn Emitter>, bool)>,
+    ) -> Result<()> {
+        let plugin = find(shape::PLUGINS, object)?;
+        let geometry = Arc::new((plugin.make)(object, self)?);
+        let mut bsdf = None;
+        let mut emitter = None;
+        for property in object.nested() {
+            let nested = self.resolve(property)?;
+            match nested.class.as_str() {
+                "bsdf" => bsdf = Some(self.bsdf(&nested)?),
+                "emitter" if nested.plugin == "area" => {
+                    let radiance = self.radiance(&nested, "radiance")?;
+                    nested.all_used("radiance")?;
+                    emitter = Some(radiance);
+                }
+                other => {
+                    let what = format!("{other} `{}` in a shape; it takes a bsdf and an area emitter", nested.plugin);
+                    return Err(nested.place.unsupported(what));
+                }
+            }
+        }
+        object.all_used(plugin.parameters)?;
+        // A shape without area (degenerate triangles only) is invisible, and as an emitter it emits nothing.
+        if geometry.area() <= 0.0 {
+            return Ok(());
+        }
+        let bsdf = bsdf.unwrap_or_else(|| bsdf::default());
+        let emitter = emitter.map(|radiance| {
+            let area = emitter::Area::new(Arc::clone(&geometry), radiance, instances.len() as u32);
+            emitters.push((Box::new(area), false));
+            emitters.len() as u32 - 1
+        });
+        instances.push(Instance { geometry, bsdf, emitter });
+        Ok(())
+    }
+
+    /// The object a property holds or refers to.
+    pub fn resolve(&self, property: &Property) -> Result<Rc<Object>> {
+        match &property.value {
+            Value::Object(object) => Ok(Rc::clone(object)),
+            Value::Reference(id) => {
+                let found = self.tree.ids.get(id).cloned();
+                found.ok_or_else(|| property.place.invalid(format!("nothing has the id `{id}`")))
+            }
+            _ => Err(property.place.invalid(format!("`{}` must be a nested object", property.name))),
+        }
+    }
+
+    fn guarded<T>(&mut self, object: &Object, make: impl FnOnce(&mut Self) -> Result<T>) -> Result<T> {
+        if self.nesting >= MAX_NESTING {
+            return Err(object.place.invalid("nested too deeply: does it refer to itself?"));
+        }
+        self.nesting += 1;
+        let made = make(self);
+        self.nesting -= 1;
+        made
+    }
+
+    /// Builds a BSDF, or gives the one already built from this object.
+    pub fn bsdf(&mut self, object: &Rc<Object>) -> Result<Arc<dyn Bsdf>> {
+        if let Some(bsdf) = self.bsdfs.get(&Rc::as_ptr(object)) {
+            return Ok(Arc::clone(bsdf));
+        }
+        let plugin = find(bsdf::PLUGINS, object)?;
+        let made = self.guarded(object, |loader| (plugin.make)(object, loader))?;
+        object.all_used(plugin.parameters)?;
+        self.bsdfs.insert(Rc::as_ptr(object), Arc::clone(&made));
+        Ok(made)
+    }
+
+    /// The BSDFs nested in an object.
+    pub fn nested_bsdfs(&mut self, object: &Object) -> Result<Vec<Arc<dyn Bsdf>>> {
+        let mut found = Vec::new();
+        for property in object.nested() {
+            let nested = self.resolve(property)?;
+            if nested.class == "bsdf" {
+                found.push(self.bsdf(&nested)?);
+            }
+        }
+        Ok(found)
+    }
+
+    /// The one BSDF nested in an object.
+    pub fn nested_bsdf(&mut self, object: &Object) -> Result<Arc<dyn Bsdf>> {
+        let mut found = self.nested_bsdfs(object)?;
+        match (found.pop(), found.is_empty()) {
+            (Some(bsdf), true) => Ok(bsdf),
+            _ => Err(object.place.invalid(format!("bsdf `{}` needs exactly one nested bsdf", object.plugin))),
+        }
+    }
+
+    /// The property `name` as a texture: a colour, a number, or a nested texture.
+    pub fn texture(&mut self, object: &Object, name: &str, default: Rgb) -> Result<Arc<dyn Texture>> {
+        match object.get(name) {
+            Some(property) if matches!(property.value, Value::Object(_) | Value::Reference(_)) => {
+                let nested = self.resolve(property)?;
+                self.texture_object(&nested)
+            }
+            _ => Ok(Arc::new(texture::Constant(object.color(name, default)?))),
+        }
+    }
+
+    /// The property `name` as emitted light, white when absent. A uniform spectrum emits equal power at every
+    /// wavelength, which is not white in linear sRGB.
+    pub fn radiance(&mut self, object: &Object, name: &str) -> Result<Arc<dyn Texture>> {
+        const EQUAL_ENERGY: Rgb = vec3(1.204_794, 0.948_291, 0.908_916);
+        if let Some(&Property { value: Value::Spectrum(value), .. }) = object.get(name) {
+            return Ok(Arc::new(texture::Constant(EQUAL_ENERGY * value)));
+        }
+        self.texture(object, name, Rgb::ONE)
+    }
+
+    /// Builds a texture, or gives the one already built from this object.
+    pub fn texture_object(&mut self, object: &Rc<Object>) -> Result<Arc<dyn Texture>> {
+        if let Some(texture) = self.textures.get(&Rc::as_ptr(object)) {
+            return Ok(Arc::clone(texture));
+        }
+        if object.class != "texture" {
+            return Err(object.place.invalid(format!("a texture is needed here, not <{}>", object.class)));
+        }
+        let plugin = find(texture::PLUGINS, object)?;
+        let made = self.guarded(object, |loader| (plugin.make)(object, loader))?;
+        object.all_used(plugin.parameters)?;
+        self.textures.insert(Rc::as_ptr(object), Arc::clone(&made));
+        Ok(made)
+    }
+
+    /// The file that the property `filename` names, looked for in the scene's folders.
+    pub fn file(&self, object: &Object) -> Result<PathBuf> {
+        let name = object.string("filename", "")?;
+        if name.is_empty() {
+            return Err(object.place.invalid(format!("{} `{}` needs a `filename`", object.class, object.plugin)));
+        }
+        let mut candidates = self.tree.folders.iter().map(|folder| folder.join(&name));
+        candidates.find(|path| path.is_file()).ok_or_else(|| {
+            let folders: Vec<_> = self.tree.folders.iter().map(|folder| folder.display().to_string()).collect();
+            let what = format!("no file `{name}` in {}", folders.join(" or "));
+            object.place_of("filename").invalid(what)
+        })
+    }
+
+    /// The texels of an image file, read once.
+    pub fn texels(&mut self, path: PathBuf) -> Result<Arc<texture::Texels>> {
+        if let Some(texels) = self.bitmaps.get(&path) {
+            return Ok(Arc::clone(texels));
+        }
+        let texels = Arc::new(texture::Texels::read(&path)?);
+        self.bitmaps.insert(path, Arc::clone(&texels));
+        Ok(texels)
+    }
+
+    /// The mesh of a shape object of type obj, ply or serialized.
+    pub fn mesh(&mut self, object: &Object) -> Result<MeshData> {
+        let path = self.file(object)?;
+        let mesh = match object.plugin.as_str() {
+            "obj" => obj::read(&path),
+            "ply" => ply::read(&path),
+            _ => {
+                let index = object.integer("shape_index", 0)?;
+                let index = usize::try_from(index)
+                    .map_err(|_| object.place_of("shape_index").invalid("`shape_index` cannot be negative"))?;
+                if !self.meshes.contains_key(&path) {
+                    self.meshes.insert(path.clone(), Arc::new(serialized::bytes(&path)?));
+                }
+                serialized::read(&self.meshes[&path], index, &path)
+            }
+        }?;
+        if mesh.positions.len() >= u32::MAX as usize {
+            return Err(Place::file(&path).unsupported("a mesh of more than four billion vertices"));
+        }
+        Ok(mesh)
+    }
+
+    /// A geometry whose transform or numbers leave the range of floats cannot be traced.
+    pub fn finite(&self, object: &Object, geometry: Geometry) -> Result<Geometry> {
+        if geometry.bounds().is_finite() {
+            Ok(geometry)
+        } else {
+            Err(object.place.invalid("coordinates are not finite"))
+        }
+    }
+}

@@ -1,0 +1,194 @@
+//! What a plugin sees of its element: typed properties that must all be asked for.
+
+use std::cell::Cell;
+use std::rc::Rc;
+
+use crate::error::{Error, Place, Result};
+use crate::math::{Mat4, Rgb, Vec3};
+
+/// A property's value.
+#[derive(Clone, Debug)]
+pub enum Value {
+    /// `<float>`.
+    Float(f64),
+    /// `<integer>`.
+    Integer(i64),
+    /// `<boolean>`.
+    Boolean(bool),
+    /// `<string>`.
+    String(String),
+    /// `<point>` or `<vector>`.
+    Vector(Vec3),
+    /// `<rgb>`.
+    Color(Rgb),
+    /// A uniform `<spectrum>`.
+    Spectrum(f32),
+    /// `<transform>`.
+    Transform(Mat4),
+    /// `<ref>` to an object by its id.
+    Reference(String),
+    /// A nested element with a `type`.
+    Object(Rc<Object>),
+}
+
+/// A named value and where it stands.
+#[derive(Debug)]
+pub struct Property {
+    /// The `name` attribute; nested objects may have none.
+    pub name: String,
+    /// The value.
+    pub value: Value,
+    /// Where it stands.
+    pub place: Place,
+    used: Cell<bool>,
+}
+
+impl Property {
+    /// A property nobody has asked for yet.
+    pub fn new(name: String, value: Value, place: Place) -> Self {
+        Self { name, value, place, used: Cell::new(false) }
+    }
+
+    fn mistyped(&self, expected: &str) -> Error {
+        self.place.invalid(format!("`{}` must be {expected}", self.name))
+    }
+}
+
+/// An element such as `<bsdf type="diffuse">` with what stands in it.
+#[derive(Debug)]
+pub struct Object {
+    /// The element's tag: shape, bsdf, emitter and so on.
+    pub class: String,
+    /// Its `type`.
+    pub plugin: String,
+    /// Where it stands.
+    pub place: Place,
+    /// Everything in it, in order.
+    pub properties: Vec<Property>,
+}
+
+impl Object {
+    /// The property `name`, marked as used.
+    pub fn get(&self, name: &str) -> Option<&Property> {
+        let found = self.properties.iter().find(|property| property.name == name)?;
+        found.used.set(true);
+        Some(found)
+    }
+
+    /// A number; whole numbers are taken too.
+    pub fn float(&self, name: &str, default: f32) -> Result<f32> {
+        match self.get(name) {
+            None => Ok(default),
+            Some(property) => match property.value {
+                Value::Float(value) => Ok(value as f32),
+                Value::Integer(value) => Ok(value as f32),
+                _ => Err(property.mistyped("a number (<float>)")),
+            },
+        }
+    }
+
+    /// A whole number.
+    pub fn integer(&self, name: &str, default: i64) -> Result<i64> {
+        match self.get(name) {
+            None => Ok(default),
+            Some(Property { value: Value::Integer(value), .. }) => Ok(*value),
+            Some(property) => Err(property.mistyped("a whole number (<integer>)")),
+        }
+    }
+
+    /// True or false.
+    pub fn boolean(&self, name: &str, default: bool) -> Result<bool> {
+        match self.get(name) {
+            None => Ok(default),
+            Some(Property { value: Value::Boolean(value), .. }) => Ok(*value),
+            Some(property) => Err(property.mistyped("true or false (<boolean>)")),
+        }
+    }
+
+    /// A string.
+    pub fn string(&self, name: &str, default: &str) -> Result<String> {
+        match self.get(name) {
+            None => Ok(default.to_owned()),
+            Some(Property { value: Value::String(value), .. }) => Ok(value.clone()),
+            Some(property) => Err(property.mistyped("a string (<string>)")),
+        }
+    }
+
+    /// A string out of a few, by its position among them.
+    pub fn choice(&self, name: &str, choices: &[&str], default: usize) -> Result<usize> {
+        let value = self.string(name, choices[default])?;
+        choices.iter().position(|choice| *choice == value).ok_or_else(|| {
+            self.place_of(name).unsupported(format!("`{name}` is `{value}`; it may be {}", choices.join(", ")))
+        })
+    }
+
+    /// A linear colour; a plain number is taken as grey.
+    pub fn color(&self, name: &str, default: Rgb) -> Result<Rgb> {
+        match self.get(name) {
+            None => Ok(default),
+            Some(property) => match property.value {
+                Value::Color(color) => Ok(color),
+                Value::Float(value) => Ok(Rgb::splat(value as f32)),
+                Value::Spectrum(value) => Ok(Rgb::splat(value)),
+                _ => Err(property.mistyped("a colour (<rgb>)")),
+            },
+        }
+    }
+
+    /// A point or a vector.
+    pub fn vector(&self, name: &str, default: Vec3) -> Result<Vec3> {
+        match self.get(name) {
+            None => Ok(default),
+            Some(Property { value: Value::Vector(value), .. }) => Ok(*value),
+            Some(property) => Err(property.mistyped("a point (<point>)")),
+        }
+    }
+
+    /// A transform, which must be invertible.
+    pub fn transform(&self, name: &str) -> Result<Mat4> {
+        match self.get(name) {
+            None => Ok(Mat4::IDENTITY),
+            Some(Property { value: Value::Transform(matrix), place, .. }) => {
+                let determinant = matrix.as_dmat4().determinant();
+                if determinant == 0.0 || !determinant.is_finite() {
+                    return Err(place.invalid(format!("the transform `{name}` cannot be inverted")));
+                }
+                Ok(*matrix)
+            }
+            Some(property) => Err(property.mistyped("a transform (<transform>)")),
+        }
+    }
+
+    /// Where `name` stands, or the object itself when it is absent.
+    pub fn place_of(&self, name: &str) -> Place {
+        self.properties.iter().find(|property| property.name == name).map_or(&self.place, |p| &p.place).clone()
+    }
+
+    /// Nested objects and references, marked as used.
+    pub fn nested(&self) -> impl Iterator<Item = &Property> {
+        let nested = |property: &&Property| matches!(property.value, Value::Object(_) | Value::Reference(_));
+        self.properties.iter().filter(nested).inspect(|property| property.used.set(true))
+    }
+
+    /// Marks properties that are known and have no meaning here.
+    pub fn ignore(&self, names: &[&str]) {
+        for name in names {
+            self.get(name);
+        }
+    }
+
+    /// Fails on the first property that nobody asked for; `supported` lists what there is.
+    pub fn all_used(&self, supported: &str) -> Result<()> {
+        match self.properties.iter().find(|property| !property.used.get()) {
+            None => Ok(()),
+            Some(property) => {
+                let (class, plugin) = (&self.class, &self.plugin);
+                let what = match &property.value {
+                    Value::Object(object) => format!("{class} `{plugin}` has no use for the {} here", object.class),
+                    _ => format!("{class} `{plugin}` has no property `{}`", property.name),
+                };
+                Err(property.place.unsupported(format!("{what}; it takes: {supported}")))
+            }
+        }
+    }
+}

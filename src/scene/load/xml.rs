@@ -1,0 +1,293 @@
+//! Mitsuba scene files as objects with typed properties: `<default>`, `$name`, `<include>`, `<path>`,
+//! `<alias>` and transforms are resolved here, so that plugins only see values.
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+use std::rc::Rc;
+
+use roxmltree::{Document, Node};
+
+use super::props::{Object, Property, Value};
+use super::transform;
+use crate::error::{Error, Place, Result};
+use crate::math::{Rgb, Vec3, vec3};
+
+/// Includes nested deeper than this are taken for a loop.
+const MAX_INCLUDES: usize = 15;
+
+/// A parsed scene file with everything it includes.
+pub struct Tree {
+    /// What stands directly under `<scene>`, in order.
+    pub objects: Vec<Rc<Object>>,
+    /// Every object with an `id`, wherever it stands.
+    pub ids: HashMap<String, Rc<Object>>,
+    /// Folders to look for files in: the scene's own first, then those of `<path>`.
+    pub folders: Vec<PathBuf>,
+    /// The text of all files read, for the scene's fingerprint.
+    pub sources: Vec<String>,
+}
+
+/// Reads a scene file. `parameters` override the file's `<default>` values.
+pub fn parse(path: &Path, parameters: &[(String, String)]) -> Result<Tree> {
+    let folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
+    let tree = Tree { objects: Vec::new(), ids: HashMap::new(), folders: vec![folder], sources: Vec::new() };
+    let defaults = parameters.iter().cloned().collect();
+    let mut parser = Parser { tree, defaults, aliases: Vec::new(), includes: Vec::new() };
+    parser.file(path)?;
+    for (id, alias, place) in std::mem::take(&mut parser.aliases) {
+        let object = parser.tree.ids.get(&id).cloned();
+        let object = object.ok_or_else(|| place.invalid(format!("alias of the unknown id `{id}`")))?;
+        parser.tree.ids.insert(alias, object);
+    }
+    Ok(parser.tree)
+}
+
+struct Parser {
+    tree: Tree,
+    defaults: HashMap<String, String>,
+    aliases: Vec<(String, String, Place)>,
+    includes: Vec<PathBuf>,
+}
+
+/// A node with what is needed to speak of its place.
+#[derive(Clone, Copy)]
+struct At<'a> {
+    node: Node<'a, 'a>,
+    file: &'a Path,
+}
+
+impl<'a> At<'a> {
+    fn place(self) -> Place {
+        Place::line(self.file, self.node.document().text_pos_at(self.node.range().start).row)
+    }
+
+    fn tag(self) -> &'a str {
+        self.node.tag_name().name()
+    }
+
+    fn children(self) -> impl Iterator<Item = At<'a>> {
+        self.node.children().filter(Node::is_element).map(move |node| At { node, file: self.file })
+    }
+}
+
+impl Parser {
+    fn file(&mut self, path: &Path) -> Result<()> {
+        let text = std::fs::read_to_string(path).map_err(|error| Error::io(path, error))?;
+        let place = |row: u32| Place::line(path, row);
+        let document = Document::parse(&text).map_err(|error| place(error.pos().row).invalid(error.to_string()))?;
+        let root = At { node: document.root_element(), file: path };
+        if root.tag() != "scene" {
+            return Err(root.place().invalid(format!("a scene file starts with <scene>, not <{}>", root.tag())));
+        }
+        let version = root.node.attribute("version").unwrap_or("3.0.0");
+        if !version.starts_with('3') && !version.starts_with('2') {
+            let what = format!("scene version {version}; versions 2 and 3 are supported");
+            return Err(root.place().unsupported(what));
+        }
+        for at in root.children() {
+            self.top_level(at)?;
+        }
+        self.tree.sources.push(text.clone());
+        Ok(())
+    }
+
+    fn top_level(&mut self, at: At) -> Result<()> {
+        match at.tag() {
+            "default" => {
+                let (name, value) = (self.attribute(at, "name")?, self.attribute(at, "value")?);
+                self.defaults.entry(name).or_insert(value);
+            }
+            "include" => {
+                let name = self.attribute(at, "filename")?;
+                let path = self.find(&name).ok_or_else(|| at.place().invalid(format!("no file `{name}`")))?;
+                if self.includes.len() >= MAX_INCLUDES || self.includes.contains(&path) || path == at.file {
+                    return Err(at.place().invalid(format!("`{name}` includes itself")));
+                }
+                self.includes.push(path.clone());
+                self.file(&path)?;
+                self.includes.pop();
+            }
+            "path" => {
+                let value = self.attribute(at, "value")?;
+                let folder = self.find(&value).ok_or_else(|| at.place().invalid(format!("no folder `{value}`")))?;
+                self.tree.folders.push(folder);
+            }
+            "alias" => {
+                let (id, alias) = (self.attribute(at, "id")?, self.attribute(at, "as")?);
+                self.aliases.push((id, alias, at.place()));
+            }
+            _ => {
+                let property = self.property(at)?;
+                if let Value::Object(object) = property.value {
+                    self.tree.objects.push(object);
+                } else {
+                    return Err(at.place().invalid(format!("<{}> is out of place directly under <scene>", at.tag())));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn find(&self, name: &str) -> Option<PathBuf> {
+        let candidates = self.tree.folders.iter().map(|folder| folder.join(name));
+        candidates.chain([PathBuf::from(name)]).find(|path| path.exists())
+    }
+
+    /// An attribute with `$name` replaced; it must be there.
+    fn attribute(&self, at: At, name: &str) -> Result<String> {
+        let missing = || at.place().invalid(format!("<{}> needs the attribute `{name}`", at.tag()));
+        self.optional(at, name)?.ok_or_else(missing)
+    }
+
+    fn optional(&self, at: At, name: &str) -> Result<Option<String>> {
+        let Some(text) = at.node.attribute(name) else { return Ok(None) };
+        if !text.contains('$') {
+            return Ok(Some(text.to_owned()));
+        }
+        let mut result = String::new();
+        let mut rest = text;
+        while let Some(start) = rest.find('$') {
+            result.push_str(&rest[..start]);
+            let after = &rest[start + 1..];
+            let end = after.find(|c: char| !c.is_alphanumeric() && c != '_').unwrap_or(after.len());
+            let value = self.defaults.get(&after[..end]).ok_or_else(|| {
+                let what = format!("parameter `${}` has no value: add a <default> or give it with -D", &after[..end]);
+                at.place().invalid(what)
+            })?;
+            result.push_str(value);
+            rest = &after[end..];
+        }
+        result.push_str(rest);
+        Ok(Some(result))
+    }
+
+    fn property(&mut self, at: At) -> Result<Property> {
+        let name = self.optional(at, "name")?.unwrap_or_default();
+        Ok(Property::new(name, self.value(at)?, at.place()))
+    }
+
+    fn value(&mut self, at: At) -> Result<Value> {
+        let place = at.place();
+        let text = |parser: &Self| parser.attribute(at, "value");
+        Ok(match at.tag() {
+            "float" => Value::Float(number(&text(self)?, &place)?),
+            "integer" => {
+                let text = text(self)?;
+                let parsed = text.trim().parse();
+                Value::Integer(parsed.map_err(|_| place.invalid(format!("`{text}` is not a whole number")))?)
+            }
+            "boolean" => match text(self)?.trim() {
+                "true" => Value::Boolean(true),
+                "false" => Value::Boolean(false),
+                other => return Err(place.invalid(format!("`{other}` is neither true nor false"))),
+            },
+            "string" => Value::String(text(self)?),
+            "rgb" => Value::Color(rgb(&text(self)?, &place)?),
+            "spectrum" => {
+                let text = text(self)?;
+                if text.contains(':') {
+                    let what = "spectra given as curves; give linear RGB with <rgb> instead";
+                    return Err(place.unsupported(format!("`spectrum` {what}")));
+                }
+                Value::Spectrum(number(&text, &place)? as f32)
+            }
+            "point" | "vector" => Value::Vector(self.vector(at, 0.0)?),
+            "transform" => Value::Transform(self.transform(at)?),
+            "ref" => Value::Reference(self.attribute(at, "id")?),
+            _ => Value::Object(self.object(at)?),
+        })
+    }
+
+    fn object(&mut self, at: At) -> Result<Rc<Object>> {
+        let plugin = self.attribute(at, "type")?;
+        let mut properties = Vec::new();
+        for child in at.children() {
+            properties.push(self.property(child)?);
+        }
+        let id = self.optional(at, "id")?;
+        let object = Rc::new(Object { class: at.tag().to_owned(), plugin, place: at.place(), properties });
+        if let Some(id) = id {
+            if self.tree.ids.insert(id.clone(), Rc::clone(&object)).is_some() {
+                return Err(at.place().invalid(format!("the id `{id}` is given twice")));
+            }
+        }
+        Ok(object)
+    }
+
+    /// x, y, z attributes, or three numbers in `value`.
+    fn vector(&self, at: At, missing: f32) -> Result<Vec3> {
+        if let Some(text) = self.optional(at, "value")? {
+            return triple(&text, &at.place());
+        }
+        let mut result = [missing; 3];
+        for (slot, name) in result.iter_mut().zip(["x", "y", "z"]) {
+            if let Some(text) = self.optional(at, name)? {
+                *slot = number(&text, &at.place())? as f32;
+            }
+        }
+        Ok(Vec3::from_array(result))
+    }
+
+    fn transform(&self, at: At) -> Result<glam::Mat4> {
+        let mut steps = Vec::new();
+        for child in at.children() {
+            let place = child.place();
+            steps.push(match child.tag() {
+                "translate" => transform::translate(self.vector(child, 0.0)?),
+                "scale" => {
+                    let uniform = self.optional(child, "value")?.filter(|text| numbers(text).count() == 1);
+                    match uniform {
+                        Some(text) => transform::scale(Vec3::splat(number(&text, &place)? as f32)),
+                        None => transform::scale(self.vector(child, 1.0)?),
+                    }
+                }
+                "rotate" => {
+                    let angle = number(&self.attribute(child, "angle")?, &place)?;
+                    transform::rotate(self.vector(child, 0.0)?, angle, &place)?
+                }
+                "lookat" => {
+                    let [origin, target] = ["origin", "target"].map(|name| self.attribute(child, name));
+                    let up = self.optional(child, "up")?;
+                    let up = up.map_or(Ok(Vec3::ZERO), |text| triple(&text, &place))?;
+                    transform::look_at(triple(&origin?, &place)?, triple(&target?, &place)?, up, &place)?
+                }
+                "matrix" => transform::matrix(&all_numbers(&self.attribute(child, "value")?, &place)?, &place)?,
+                other => {
+                    let known = "translate, scale, rotate, lookat, matrix";
+                    return Err(place.invalid(format!("unknown transform <{other}>; there are {known}")));
+                }
+            });
+        }
+        Ok(transform::chain(&steps))
+    }
+}
+
+fn numbers(text: &str) -> impl Iterator<Item = &str> {
+    text.split(|c: char| c == ',' || c.is_whitespace()).filter(|part| !part.is_empty())
+}
+
+fn all_numbers(text: &str, place: &Place) -> Result<Vec<f64>> {
+    numbers(text).map(|part| number(part, place)).collect()
+}
+
+fn number(text: &str, place: &Place) -> Result<f64> {
+    match text.trim().parse::<f64>() {
+        Ok(value) if value.is_finite() => Ok(value),
+        _ => Err(place.invalid(format!("`{text}` is not a finite number"))),
+    }
+}
+
+fn triple(text: &str, place: &Place) -> Result<Vec3> {
+    match all_numbers(text, place)?.as_slice() {
+        &[x, y, z] => Ok(vec3(x as f32, y as f32, z as f32)),
+        other => Err(place.invalid(format!("`{text}` has {} numbers; three are needed", other.len()))),
+    }
+}
+
+/// One number or three.
+fn rgb(text: &str, place: &Place) -> Result<Rgb> {
+    match numbers(text).count() {
+        1 => Ok(Rgb::splat(number(text, place)? as f32)),
+        _ => triple(text, place),
+    }
+}

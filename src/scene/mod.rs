@@ -1,0 +1,216 @@
+//! A scene: geometry in Embree, materials, emitters, a sensor. Immutable once loaded and shared by all threads;
+//! nothing here fails after [`load::load`].
+
+pub mod accel;
+pub mod bsdf;
+pub mod emitter;
+pub mod load;
+pub mod sensor;
+pub mod shape;
+pub mod surface;
+pub mod texture;
+
+use std::sync::Arc;
+
+use self::accel::Accel;
+use self::bsdf::Bsdf;
+use self::emitter::{Emitter, LightPoint};
+use self::sensor::Sensor;
+pub use self::shape::Bounds;
+use self::shape::Geometry;
+pub use self::surface::Surface;
+use crate::error::Result;
+use crate::math::discrete::Discrete;
+use crate::math::{Rgb, Vec2, Vec3};
+
+/// A ray with a unit direction.
+#[derive(Clone, Copy, Debug)]
+pub struct Ray {
+    /// Where it starts.
+    pub origin: Vec3,
+    /// Where it goes, of length one.
+    pub direction: Vec3,
+}
+
+/// How deep paths go, as Mitsuba's `path` integrator counts: edges from the sensor to the light.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Integrator {
+    /// Longest path in edges: 1 is visible emitters only, 2 adds direct light. `u32::MAX`: no bound.
+    pub max_depth: u32,
+    /// Number of scattering events after which Russian roulette begins.
+    pub rr_depth: u32,
+}
+
+impl Default for Integrator {
+    fn default() -> Self {
+        Self { max_depth: u32::MAX, rr_depth: 5 }
+    }
+}
+
+/// A shape with what it is made of.
+pub struct Instance {
+    /// Its surface.
+    pub geometry: Arc<Geometry>,
+    /// Its material.
+    pub bsdf: Arc<dyn Bsdf>,
+    /// Its number among the emitters, if it glows.
+    pub emitter: Option<u32>,
+}
+
+/// What a loader hands over; emitters come with whether they surround the scene.
+pub struct Parts {
+    /// Shapes in the order of the file.
+    pub instances: Vec<Instance>,
+    /// Emitters, numbered as the instances name them.
+    pub emitters: Vec<(Box<dyn Emitter>, bool)>,
+    /// The camera.
+    pub sensor: Sensor,
+    /// Path depths.
+    pub integrator: Integrator,
+    /// Hash of the scene's text.
+    pub fingerprint: u64,
+}
+
+/// Everything a path can meet.
+pub struct Scene {
+    accel: Accel,
+    instances: Vec<Instance>,
+    emitters: Vec<Box<dyn Emitter>>,
+    /// Chance of each emitter to be chosen; `None` when nothing emits.
+    emitter_choice: Option<Discrete>,
+    environment: Option<u32>,
+    sensor: Sensor,
+    integrator: Integrator,
+    fingerprint: u64,
+}
+
+impl Scene {
+    /// Builds the acceleration structure and the emitter choice.
+    pub fn build(parts: Parts, threads: usize) -> Result<Self> {
+        let Parts { instances, emitters, sensor, integrator, fingerprint } = parts;
+        let accel = Accel::build(&instances, threads)?;
+        let surrounding: Vec<_> = (0u32..).zip(&emitters).filter(|(_, (_, around))| *around).map(|(i, _)| i).collect();
+        if surrounding.len() > 1 {
+            let what = "the scene has more than one environment (envmap or constant emitter); it can have one";
+            return Err(crate::error::Error::Usage(what.into()));
+        }
+        let mut emitters: Vec<_> = emitters.into_iter().map(|(emitter, _)| emitter).collect();
+        emitters.iter_mut().for_each(|emitter| emitter.enclose(accel.bounds()));
+        let emitter_choice = Self::choice(&emitters);
+        let environment = surrounding.first().copied();
+        Ok(Self { accel, instances, emitters, emitter_choice, environment, sensor, integrator, fingerprint })
+    }
+
+    /// Half of the choices go by power and half are even, so that a weak emitter close by is not starved.
+    fn choice(emitters: &[Box<dyn Emitter>]) -> Option<Discrete> {
+        let powers: Vec<f32> = emitters.iter().map(|emitter| emitter.power()).collect();
+        let total: f32 = powers.iter().sum();
+        let lit = powers.iter().filter(|&&power| power > 0.0).count() as f32;
+        let share = |power: f32| if power > 0.0 { 0.5 / lit + 0.5 * (power / total) } else { 0.0 };
+        Discrete::new(powers.into_iter().map(share))
+    }
+
+    /// The first surface along a ray.
+    pub fn intersect(&self, ray: Ray) -> Option<Surface> {
+        let hit = self.accel.intersect(ray)?;
+        let instance = &self.instances[hit.geometry as usize];
+        let mut surface = instance.geometry.surface(&hit, ray, instance.bsdf.needs_derivatives());
+        surface.instance = hit.geometry;
+        Some(surface)
+    }
+
+    /// Whether light passes between a surface and a point on an emitter.
+    pub fn visible(&self, from: &Surface, point: &LightPoint) -> bool {
+        match point.position {
+            emitter::Position::Surface { p, n, epsilon } => {
+                !self.accel.blocked(from.leave(p - from.p), surface::offset(p, n, epsilon, from.p - p))
+            }
+            emitter::Position::Infinity { direction } => {
+                !self.accel.blocked_to_infinity(from.leave(direction), direction)
+            }
+        }
+    }
+
+    /// Whether two surface points see each other.
+    pub fn mutually_visible(&self, a: &Surface, b: &Surface) -> bool {
+        !self.accel.blocked(a.leave(b.p - a.p), b.leave(a.p - b.p))
+    }
+
+    /// The material of a surface.
+    pub fn bsdf(&self, surface: &Surface) -> &dyn Bsdf {
+        &*self.instances[surface.instance as usize].bsdf
+    }
+
+    /// A point on an emitter, with its density per solid angle at `from` including the choice of emitter.
+    pub fn sample_emitter(&self, from: &Surface, choice: f32, u: Vec2) -> Option<(LightPoint, f32)> {
+        let table = self.emitter_choice.as_ref()?;
+        let (index, _) = table.sample(choice);
+        let emitter = &self.emitters[index];
+        let mut point = emitter.sample(from.p, u)?;
+        point.emitter = index as u32;
+        let pdf = emitter.pdf(from.p, &point) * table.probability(index);
+        (pdf > 0.0).then_some((point, pdf))
+    }
+
+    /// Density with which [`Scene::sample_emitter`] finds `point` from `from`.
+    pub fn emitter_pdf(&self, from: Vec3, point: &LightPoint) -> f32 {
+        let chance = self.emitter_choice.as_ref().map_or(0.0, |table| table.probability(point.emitter as usize));
+        if chance > 0.0 { chance * self.emitters[point.emitter as usize].pdf(from, point) } else { 0.0 }
+    }
+
+    /// Radiance that `point` sends along `direction`, which points away from the emitter.
+    pub fn radiance(&self, point: &LightPoint, direction: Vec3) -> Rgb {
+        self.emitters[point.emitter as usize].radiance(point, direction)
+    }
+
+    /// The surface as a point of its emitter, if it is one.
+    pub fn light_point(&self, surface: &Surface) -> Option<LightPoint> {
+        let emitter = self.instances[surface.instance as usize].emitter?;
+        Some(LightPoint::on_surface(surface, emitter))
+    }
+
+    /// The environment as seen along `direction`, if there is one.
+    pub fn environment(&self, direction: Vec3) -> Option<LightPoint> {
+        Some(LightPoint::at_infinity(direction, self.environment?))
+    }
+
+    /// The camera.
+    pub fn sensor(&self) -> &Sensor {
+        &self.sensor
+    }
+
+    /// Path depths.
+    pub fn integrator(&self) -> Integrator {
+        self.integrator
+    }
+
+    /// Shapes with their materials.
+    pub fn instances(&self) -> &[Instance] {
+        &self.instances
+    }
+
+    /// All emitters.
+    pub fn emitters(&self) -> &[Box<dyn Emitter>] {
+        &self.emitters
+    }
+
+    /// Whether an environment surrounds the scene.
+    pub fn has_environment(&self) -> bool {
+        self.environment.is_some()
+    }
+
+    /// The box around all shapes.
+    pub fn bounds(&self) -> Bounds {
+        self.accel.bounds()
+    }
+
+    /// Hash of the scene's text, to tell scenes apart.
+    pub fn fingerprint(&self) -> u64 {
+        self.fingerprint
+    }
+
+    /// Embree's version, for `info`.
+    pub fn embree_version(&self) -> (u32, u32, u32) {
+        self.accel.version()
+    }
+}

@@ -1,0 +1,187 @@
+//! Triangle meshes in world space.
+
+use std::sync::Arc;
+
+use super::Bounds;
+use crate::ffi::embree::{Hit, PaddedVertices};
+use crate::math::discrete::Discrete;
+use crate::math::{Frame, Mat4, Vec2, Vec3, vec2, warp};
+use crate::scene::emitter::{LightPoint, Position};
+use crate::scene::load::MeshData;
+use crate::scene::surface::epsilon;
+use crate::scene::{Ray, Surface};
+
+/// Triangles with optional normals and texture coordinates, shared with Embree.
+pub struct Mesh {
+    /// World positions.
+    pub positions: Arc<PaddedVertices>,
+    /// Vertex numbers.
+    pub triangles: Arc<Vec<[u32; 3]>>,
+    /// Unit normals, or none for flat shading.
+    normals: Vec<Vec3>,
+    /// Texture coordinates, or none for barycentric ones.
+    uvs: Vec<Vec2>,
+    /// -1 to turn the surface inside out.
+    side: f32,
+    /// Triangles by area.
+    areas: Option<Discrete>,
+    bounds: Bounds,
+}
+
+/// How a mesh is placed and shaded.
+#[derive(Clone, Copy, Debug)]
+pub struct Placement {
+    /// Object to world.
+    pub to_world: Mat4,
+    /// Flat shading, whatever normals the data has.
+    pub face_normals: bool,
+    /// Swap inside and outside.
+    pub flip_normals: bool,
+}
+
+impl Mesh {
+    /// Places mesh data in the world. Triangles with non-finite corners are left out. Missing vertex normals
+    /// are averaged from the faces by angle (Thürmer and Wüthrich 1998) unless shading is flat.
+    pub fn new(data: MeshData, placement: Placement) -> Self {
+        let Placement { to_world, face_normals, flip_normals } = placement;
+        let positions: Vec<Vec3> = data.positions.iter().map(|&p| to_world.transform_point3(p)).collect();
+        let mut triangles = data.triangles;
+        triangles.retain(|triangle| triangle.iter().all(|&i| positions[i as usize].is_finite()));
+        let normals = if face_normals {
+            Vec::new()
+        } else if data.normals.is_empty() {
+            angle_weighted_normals(&positions, &triangles)
+        } else {
+            let matrix = to_world.inverse().transpose();
+            data.normals.iter().map(|&n| matrix.transform_vector3(n).normalize_or_zero()).collect()
+        };
+        let area = |t: &[u32; 3]| {
+            let [a, b, c] = t.map(|i| positions[i as usize]);
+            0.5 * (b - a).cross(c - a).length()
+        };
+        let areas = Discrete::new(triangles.iter().map(area));
+        let bounds = Bounds::of(triangles.iter().flatten().map(|&i| positions[i as usize]));
+        Self {
+            positions: Arc::new(PaddedVertices::new(positions.iter().map(|p| p.to_array()))),
+            triangles: Arc::new(triangles),
+            normals,
+            uvs: data.uvs,
+            side: if flip_normals { -1.0 } else { 1.0 },
+            areas,
+            bounds,
+        }
+    }
+
+    fn corners(&self, triangle: [u32; 3]) -> [Vec3; 3] {
+        triangle.map(|index| Vec3::from_array(self.positions.get(index)))
+    }
+
+    /// Geometric and shading normal at barycentric coordinates, the first turned to the side of the second.
+    fn normals_at(&self, triangle: [u32; 3], [a, b, c]: [Vec3; 3], weights: [f32; 3]) -> (Vec3, Vec3) {
+        let flat = (b - a).cross(c - a).normalize_or(Vec3::Z) * self.side;
+        if self.normals.is_empty() {
+            return (flat, flat);
+        }
+        let smooth: Vec3 = (0..3).map(|k| self.normals[triangle[k] as usize] * weights[k]).sum();
+        match smooth.try_normalize() {
+            Some(smooth) => {
+                let smooth = smooth * self.side;
+                (flat * 1f32.copysign(flat.dot(smooth)), smooth)
+            }
+            None => (flat, flat),
+        }
+    }
+
+    fn uv_at(&self, triangle: [u32; 3], weights: [f32; 3]) -> Vec2 {
+        if self.uvs.is_empty() {
+            return vec2(weights[1], weights[2]);
+        }
+        (0..3).map(|k| self.uvs[triangle[k] as usize] * weights[k]).sum()
+    }
+
+    /// What a ray has hit.
+    #[inline]
+    pub fn surface(&self, hit: &Hit, ray: Ray, derivatives: bool) -> Surface {
+        let triangle = self.triangles[hit.primitive as usize];
+        let corners = self.corners(triangle);
+        let weights = [1.0 - hit.u - hit.v, hit.u, hit.v];
+        let p = corners[0] * weights[0] + corners[1] * weights[1] + corners[2] * weights[2];
+        let (n, shading) = self.normals_at(triangle, corners, weights);
+        let (mut dp_du, mut dp_dv) = (Vec3::ZERO, Vec3::ZERO);
+        let frame = if derivatives {
+            (dp_du, dp_dv) = self.derivatives(triangle, corners, n);
+            Frame::along(shading, dp_du)
+        } else {
+            Frame::around(shading)
+        };
+        Surface {
+            p,
+            n,
+            frame,
+            uv: self.uv_at(triangle, weights),
+            dp_du,
+            dp_dv,
+            epsilon: epsilon(magnitude(corners)),
+            wi: frame.to_local(-ray.direction),
+            instance: 0,
+        }
+    }
+
+    fn derivatives(&self, triangle: [u32; 3], [a, b, c]: [Vec3; 3], n: Vec3) -> (Vec3, Vec3) {
+        if !self.uvs.is_empty() {
+            let [ua, ub, uc] = triangle.map(|index| self.uvs[index as usize]);
+            let (d0, d1, e0, e1) = (ub - ua, uc - ua, b - a, c - a);
+            let determinant = d0.perp_dot(d1);
+            if determinant != 0.0 {
+                return ((e0 * d1.y - e1 * d0.y) / determinant, (e1 * d0.x - e0 * d1.x) / determinant);
+            }
+        }
+        let frame = Frame::around(n);
+        (frame.s, frame.t)
+    }
+
+    /// Total area.
+    pub fn area(&self) -> f32 {
+        self.areas.as_ref().map_or(0.0, |areas| areas.total() as f32)
+    }
+
+    /// Box around all triangles.
+    pub fn bounds(&self) -> Bounds {
+        self.bounds
+    }
+
+    /// A point uniform over the area.
+    pub fn sample(&self, u: Vec2) -> Option<LightPoint> {
+        let (index, rest) = self.areas.as_ref()?.sample(u.y);
+        let triangle = self.triangles[index];
+        let corners = self.corners(triangle);
+        let b = warp::triangle(vec2(u.x, rest));
+        let weights = [1.0 - b.x - b.y, b.x, b.y];
+        let p = corners[0] * weights[0] + corners[1] * weights[1] + corners[2] * weights[2];
+        let (n, _) = self.normals_at(triangle, corners, weights);
+        let position = Position::Surface { p, n, epsilon: epsilon(magnitude(corners)) };
+        Some(LightPoint { position, uv: self.uv_at(triangle, weights), emitter: 0 })
+    }
+
+    /// Density of [`Mesh::sample`] per solid angle at `from`.
+    pub fn pdf(&self, from: Vec3, point: &LightPoint) -> f32 {
+        point.area_to_solid_angle(from, 1.0 / self.area())
+    }
+}
+
+fn magnitude(corners: [Vec3; 3]) -> f32 {
+    corners.into_iter().fold(Vec3::ZERO, |largest, corner| largest.max(corner.abs())).max_element()
+}
+
+fn angle_weighted_normals(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<Vec3> {
+    let mut normals = vec![Vec3::ZERO; positions.len()];
+    for triangle in triangles {
+        let corners = triangle.map(|index| positions[index as usize]);
+        let Some(n) = (corners[1] - corners[0]).cross(corners[2] - corners[0]).try_normalize() else { continue };
+        for k in 0..3 {
+            let (to_next, to_last) = (corners[(k + 1) % 3] - corners[k], corners[(k + 2) % 3] - corners[k]);
+            normals[triangle[k] as usize] += n * to_next.angle_between(to_last);
+        }
+    }
+    normals.iter().map(|n| n.normalize_or_zero()).collect()
+}

@@ -1,0 +1,25 @@
+//! The square [-1, 1]² in the plane z = 0, facing +z.
+
+use super::Geometry;
+use super::mesh::{Mesh, Placement};
+use crate::error::Result;
+use crate::math::{Vec3, vec2, vec3};
+use crate::scene::load::props::Object;
+use crate::scene::load::{Loader, MeshData, Plugin};
+
+/// `rectangle`.
+pub const PLUGIN: Plugin<Geometry> = Plugin { name: "rectangle", parameters: "to_world, flip_normals", make };
+
+fn make(object: &Object, loader: &mut Loader) -> Result<Geometry> {
+    let to_world = object.transform("to_world")?;
+    let flip_normals = object.boolean("flip_normals", false)?;
+    let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
+    let data = MeshData {
+        positions: corners.iter().map(|&(x, y)| vec3(x, y, 0.0)).collect(),
+        // With normals given, a mirroring transform keeps the side that faces +z.
+        normals: vec![Vec3::Z; 4],
+        uvs: corners.iter().map(|&(x, y)| vec2(0.5 * x + 0.5, 0.5 * y + 0.5)).collect(),
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+    };
+    loader.finite(object, Geometry::Mesh(Mesh::new(data, Placement { to_world, face_normals: false, flip_normals })))
+}

@@ -1,0 +1,205 @@
+//! Image files as textures: nearest or bilinear, in linear colour. Eight-bit files stay in eight bits.
+
+use std::path::Path;
+use std::sync::{Arc, OnceLock};
+
+use super::{Texture, UvTransform};
+use crate::error::{Error, Result};
+use crate::image::io;
+use crate::math::{Rgb, Vec2, luminance, srgb_decode, vec2, vec3};
+use crate::scene::load::props::Object;
+use crate::scene::load::{Loader, Plugin};
+
+/// `bitmap`. An alpha channel is not used.
+pub const PLUGIN: Plugin<Arc<dyn Texture>> = Plugin {
+    name: "bitmap",
+    parameters: "filename, filter_type (bilinear, nearest), wrap_mode (repeat, mirror, clamp), raw, to_uv",
+    make,
+};
+
+fn make(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Texture>> {
+    let nearest = object.choice("filter_type", &["bilinear", "nearest"], 0)? == 1;
+    let wrap =
+        [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp][object.choice("wrap_mode", &["repeat", "mirror", "clamp"], 0)?];
+    let raw = object.boolean("raw", false)?;
+    let to_uv = UvTransform::load(object)?;
+    let path = loader.file(object)?;
+    let texels = loader.texels(path)?;
+    let mut bitmap = Bitmap { texels, nearest, wrap, raw, to_uv, mean: 0.0 };
+    bitmap.mean = bitmap.average();
+    Ok(Arc::new(bitmap))
+}
+
+/// An image as it is stored: one or three channels, alpha dropped.
+pub struct Texels {
+    /// Pixels in a row.
+    pub width: usize,
+    /// Number of rows.
+    pub height: usize,
+    samples: Samples,
+}
+
+enum Samples {
+    Byte(Vec<[u8; 3]>),
+    Float(Vec<Rgb>),
+}
+
+impl Texels {
+    /// Reads an image file; grey is spread over the three channels.
+    pub fn read(path: &Path) -> Result<Self> {
+        let pixels = io::read(path, &[])?;
+        let position = |name: &str| pixels.channels.iter().position(|other| other.eq_ignore_ascii_case(name));
+        let order = match (position("R"), position("G"), position("B")) {
+            (Some(r), Some(g), Some(b)) => [r, g, b],
+            _ if pixels.channels.len() <= 2 => [0; 3],
+            _ => return Err(Error::io(path, format!("no channels R, G, B among {}", pixels.channels.join(", ")))),
+        };
+        let texels = pixels.data.chunks_exact(pixels.channels.len()).map(|pixel| order.map(|channel| pixel[channel]));
+        let samples = if pixels.eight_bit {
+            Samples::Byte(texels.map(|texel| texel.map(|value| (value * 255.0).round() as u8)).collect())
+        } else {
+            // A texel that is not a number would poison every path that meets it.
+            let finite = |value: f32| if value.is_finite() { value } else { 0.0 };
+            Samples::Float(texels.map(|texel| Rgb::from_array(texel.map(finite))).collect())
+        };
+        Ok(Self { width: pixels.width, height: pixels.height, samples })
+    }
+
+    /// Linear colour of a texel. `raw`: take eight-bit values as they are instead of decoding sRGB.
+    #[inline]
+    pub fn texel(&self, x: usize, y: usize, raw: bool) -> Rgb {
+        let at = y * self.width + x;
+        match &self.samples {
+            Samples::Float(texels) => texels[at],
+            Samples::Byte(texels) => {
+                let [r, g, b] = texels[at];
+                let table = if raw { linear_table() } else { srgb_table() };
+                vec3(table[r as usize], table[g as usize], table[b as usize])
+            }
+        }
+    }
+}
+
+fn srgb_table() -> &'static [f32; 256] {
+    static TABLE: OnceLock<[f32; 256]> = OnceLock::new();
+    TABLE.get_or_init(|| std::array::from_fn(|i| srgb_decode(i as f32 / 255.0)))
+}
+
+fn linear_table() -> &'static [f32; 256] {
+    static TABLE: OnceLock<[f32; 256]> = OnceLock::new();
+    TABLE.get_or_init(|| std::array::from_fn(|i| i as f32 / 255.0))
+}
+
+#[derive(Clone, Copy)]
+enum Wrap {
+    Repeat,
+    Mirror,
+    Clamp,
+}
+
+impl Wrap {
+    fn apply(self, index: i64, size: usize) -> usize {
+        let n = size as i64;
+        let wrapped = match self {
+            Self::Repeat => index.rem_euclid(n),
+            Self::Mirror => {
+                let twice = index.rem_euclid(2 * n);
+                twice.min(2 * n - 1 - twice)
+            }
+            Self::Clamp => index.clamp(0, n - 1),
+        };
+        wrapped as usize
+    }
+}
+
+struct Bitmap {
+    texels: Arc<Texels>,
+    nearest: bool,
+    wrap: Wrap,
+    raw: bool,
+    to_uv: UvTransform,
+    mean: f32,
+}
+
+/// The four texels around a point, and how far it is from the first to the others.
+struct Footprint {
+    texels: [Rgb; 4],
+    fraction: Vec2,
+}
+
+impl Bitmap {
+    fn fetch(&self, x: i64, y: i64) -> Rgb {
+        let (x, y) = (self.wrap.apply(x, self.texels.width), self.wrap.apply(y, self.texels.height));
+        self.texels.texel(x, y, self.raw)
+    }
+
+    fn resolution(&self) -> Vec2 {
+        vec2(self.texels.width as f32, self.texels.height as f32)
+    }
+
+    fn footprint(&self, uv: Vec2) -> Footprint {
+        let at = self.to_uv.apply(uv) * self.resolution() - 0.5;
+        let corner = at.floor();
+        let (x, y) = (corner.x as i64, corner.y as i64);
+        let texels = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(dx, dy)| self.fetch(x + dx, y + dy));
+        Footprint { texels, fraction: at - corner }
+    }
+
+    fn average(&self) -> f32 {
+        let (width, height) = (self.texels.width, self.texels.height);
+        let row = |y| (0..width).map(|x| f64::from(luminance(self.texels.texel(x, y, self.raw)))).sum::<f64>();
+        ((0..height).map(row).sum::<f64>() / (width * height) as f64) as f32
+    }
+}
+
+impl Texture for Bitmap {
+    fn color(&self, uv: Vec2) -> Rgb {
+        if self.nearest {
+            let at = (self.to_uv.apply(uv) * self.resolution()).floor();
+            return self.fetch(at.x as i64, at.y as i64);
+        }
+        let Footprint { texels: [a, b, c, d], fraction: f } = self.footprint(uv);
+        a.lerp(b, f.x).lerp(c.lerp(d, f.x), f.y)
+    }
+
+    fn gradient(&self, uv: Vec2) -> Vec2 {
+        if self.nearest {
+            return Vec2::ZERO;
+        }
+        let Footprint { texels, fraction: f } = self.footprint(uv);
+        let [a, b, c, d] = texels.map(luminance);
+        let (dx, dy) = ((1.0 - f.y) * (b - a) + f.y * (d - c), (1.0 - f.x) * (c - a) + f.x * (d - b));
+        let per_texel = vec2(dx, dy);
+        vec2(self.to_uv.u.dot(per_texel), self.to_uv.v.dot(per_texel)) * self.resolution()
+    }
+
+    fn mean(&self) -> f32 {
+        self.mean
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn wrapping_is_as_documented() {
+        let row = |wrap: Wrap| (-4..6).map(|i| wrap.apply(i, 3)).collect::<Vec<_>>();
+        assert_eq!(row(Wrap::Repeat), [2, 0, 1, 2, 0, 1, 2, 0, 1, 2]);
+        assert_eq!(row(Wrap::Mirror), [2, 2, 1, 0, 0, 1, 2, 2, 1, 0]);
+        assert_eq!(row(Wrap::Clamp), [0, 0, 0, 0, 0, 1, 2, 2, 2, 2]);
+    }
+
+    #[test]
+    fn bilinear_passes_through_texel_centres_and_its_gradient_is_its_slope() {
+        let samples = Samples::Float((0..12).map(|i| Rgb::splat((i * i) as f32)).collect());
+        let texels = Arc::new(Texels { width: 4, height: 3, samples });
+        let to_uv = UvTransform { u: vec2(1.0, 0.0), v: vec2(0.0, 1.0), origin: Vec2::ZERO };
+        let bitmap = Bitmap { texels, nearest: false, wrap: Wrap::Repeat, raw: true, to_uv, mean: 0.0 };
+        assert!((bitmap.color(vec2(1.5 / 4.0, 2.5 / 3.0)).x - 81.0).abs() < 1e-4);
+        let (uv, h) = (vec2(0.4, 0.55), 1e-3);
+        let slope = |d: Vec2| (bitmap.scalar(uv + d) - bitmap.scalar(uv - d)) / (2.0 * h);
+        let expected = vec2(slope(vec2(h, 0.0)), slope(vec2(0.0, h)));
+        assert!((bitmap.gradient(uv) - expected).length() < 1e-2 * expected.length());
+    }
+}

@@ -1,0 +1,79 @@
+//! Textures: linear colour as a function of texture coordinates. v counts downwards in image files.
+
+mod bitmap;
+mod checkerboard;
+
+pub use self::bitmap::Texels;
+use super::load::Plugin;
+use super::load::props::Object;
+use crate::error::Result;
+use crate::math::{Mat4, Rgb, Vec2, luminance, vec2};
+use std::sync::Arc;
+
+/// The textures of scene files.
+pub const PLUGINS: &[Plugin<Arc<dyn Texture>>] = &[bitmap::PLUGIN, checkerboard::PLUGIN];
+
+/// A colour or a number over a surface.
+pub trait Texture: Send + Sync {
+    /// Linear colour at texture coordinates.
+    fn color(&self, uv: Vec2) -> Rgb;
+
+    /// The colour as one number: its luminance for images, its mean for constants.
+    fn scalar(&self, uv: Vec2) -> f32 {
+        luminance(self.color(uv))
+    }
+
+    /// Change of [`Texture::scalar`] per u and per v.
+    fn gradient(&self, _uv: Vec2) -> Vec2 {
+        Vec2::ZERO
+    }
+
+    /// Average of [`Texture::scalar`] over the unit square; steers sampling only.
+    fn mean(&self) -> f32;
+
+    /// The colour, if it is the same everywhere.
+    fn constant(&self) -> Option<Rgb> {
+        None
+    }
+}
+
+/// The same colour everywhere.
+pub struct Constant(pub Rgb);
+
+impl Texture for Constant {
+    fn color(&self, _uv: Vec2) -> Rgb {
+        self.0
+    }
+
+    fn scalar(&self, _uv: Vec2) -> f32 {
+        self.0.element_sum() / 3.0
+    }
+
+    fn mean(&self) -> f32 {
+        self.0.element_sum() / 3.0
+    }
+
+    fn constant(&self) -> Option<Rgb> {
+        Some(self.0)
+    }
+}
+
+/// The part of a `to_uv` transform that acts on texture coordinates.
+#[derive(Clone, Copy)]
+struct UvTransform {
+    u: Vec2,
+    v: Vec2,
+    origin: Vec2,
+}
+
+impl UvTransform {
+    fn load(object: &Object) -> Result<Self> {
+        let matrix: Mat4 = object.transform("to_uv")?;
+        let column = |axis: glam::Vec4| vec2(axis.x, axis.y);
+        Ok(Self { u: column(matrix.x_axis), v: column(matrix.y_axis), origin: column(matrix.w_axis) })
+    }
+
+    fn apply(&self, uv: Vec2) -> Vec2 {
+        self.u * uv.x + self.v * uv.y + self.origin
+    }
+}

@@ -1,0 +1,4 @@
+//! Solvers on image grids.
+
+pub mod dct;
+pub mod poisson;
