@@ -88,16 +88,18 @@ pub fn check(folder: &Path, spp: u32, seed: u64) -> Result<Verdict> {
         return Err(Error::io(&path, format!("no channels {}", CHANNELS.join(", "))));
     };
     let scene = load::load(&folder.join("scene.xml"), &load::Options { size: Some(size), ..load::Options::default() })?;
-    let (image, _) = image_and_sigma(&path_traced(&scene, spp, seed))?;
+    let (image, own_sigma) = image_and_sigma(&path_traced(&scene, spp, seed))?;
     let mut sums = [[0.0; 3]; 3];
     let (mut squares, mut outliers) = (0.0, 0);
     for (pixel, expected) in reference.data.chunks_exact(reference.channels.len()).enumerate() {
         for c in 0..3 {
             let (value, expected_value) = (f64::from(image.data[3 * pixel + c]), f64::from(expected[positions[c]]));
             let rounding = HALF_ROUNDING * expected_value;
-            // The noise of few samples is better known from the many of the reference than from themselves.
-            let sigma = f64::from(expected[positions[c + 3]]);
-            let variance = sigma * sigma * (1.0 + reference_spp / f64::from(spp)) + rounding * rounding;
+            // Few samples may all have missed what makes the noise, and the reference may have missed what a few
+            // have hit: the larger of both figures is believed.
+            let [sigma, own] = [expected[positions[c + 3]], own_sigma.data[3 * pixel + c]].map(f64::from);
+            let variance = sigma * sigma + (own * own).max(sigma * sigma * reference_spp / f64::from(spp));
+            let variance = variance + rounding * rounding;
             let difference = value - expected_value;
             let z = if difference == 0.0 { 0.0 } else { difference / variance.max(1e-12).sqrt() };
             squares += z * z;

@@ -17,7 +17,7 @@ use super::stats::Stats;
 pub struct Args {
     /// EXR file written by `fluxion render --layers`
     layers: PathBuf,
-    /// Image to write, by its extension: exr, hdr, pfm, png or jpg; may be given several times
+    /// Image to write, by its extension: exr, hdr, png or jpg; may be given several times
     #[arg(short, long, required = true, value_name = "FILE")]
     output: Vec<PathBuf>,
     /// Reconstruction with its parameters; `fluxion info --methods` lists them

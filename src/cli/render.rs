@@ -25,7 +25,7 @@ use super::{progress, stats};
 pub struct Args {
     /// Scene file, Mitsuba 3 XML
     scene: PathBuf,
-    /// Image to write, by its extension: exr, hdr, pfm, png or jpg; may be given several times
+    /// Image to write, by its extension: exr, hdr, png or jpg; may be given several times
     #[arg(short, long, required_unless_present = "replay", value_name = "FILE")]
     output: Vec<PathBuf>,
     /// Samples per pixel [default: the scene's own]
@@ -62,7 +62,7 @@ pub struct Args {
     #[arg(short = 'D', value_parser = super::parse_definition, value_name = "NAME=VALUE")]
     define: Vec<(String, String)>,
     /// Roughness above which paths are reconnected through a material instead of half-vector copied
-    #[arg(long, default_value_t = 0.01, hide_short_help = true)]
+    #[arg(long, default_value_t = 0.001, hide_short_help = true)]
     shift_threshold: f32,
     /// Show no progress
     #[arg(short, long)]

@@ -13,7 +13,7 @@ pub struct Args {
     /// Folders with a scene.xml and a reference.exr [default: all below scenes/]
     scenes: Vec<PathBuf>,
     /// Samples per pixel to check with
-    #[arg(long, default_value_t = 64)]
+    #[arg(long, default_value_t = 256)]
     spp: u32,
     /// Seed to check with
     #[arg(long, default_value_t = 1)]

@@ -8,7 +8,7 @@ pub use crate::ffi::oiio::{Kind, Pixels, read, write};
 use crate::math::srgb_encode;
 
 /// Formats that hold linear radiance as floats.
-const LINEAR: &[&str] = &["exr", "hdr", "pfm"];
+const LINEAR: &[&str] = &["exr", "hdr"];
 /// Formats that hold display-encoded eight-bit colour.
 const ENCODED: &[&str] = &["png", "jpg", "jpeg"];
 
@@ -26,7 +26,7 @@ pub fn check_writable(path: &Path) -> Result<()> {
     Err(Error::io(path, format!("the extension `{extension}` is not one of {formats}")))
 }
 
-/// Writes a linear RGB image: as it is to exr, hdr and pfm; clamped and sRGB-encoded to png and jpg.
+/// Writes a linear RGB image: as it is to exr and hdr; clamped and sRGB-encoded to png and jpg.
 pub fn write_color(path: &Path, image: &Image, attributes: &[(String, String)]) -> Result<()> {
     check_writable(path)?;
     let encoded = ENCODED.contains(&extension(path).as_str());
@@ -71,9 +71,9 @@ mod tests {
 
     #[test]
     fn every_format_gives_back_what_it_can_hold() {
-        let image = Image::from_rgb(5, 3, |x, y| vec3(x as f32 / 5.0, y as f32 / 3.0, 0.5));
+        let image = Image::from_rgb(40, 24, |x, y| vec3(x as f32 / 40.0, y as f32 / 24.0, 0.5));
         let folder = tempfile::tempdir().unwrap();
-        for (name, tolerance) in [("a.exr", 0.0), ("a.hdr", 0.01), ("a.png", 0.01), ("a.jpg", 0.2), ("a.pfm", 0.0)] {
+        for (name, tolerance) in [("a.exr", 0.0), ("a.hdr", 0.01), ("a.png", 0.01), ("a.jpg", 0.2)] {
             let path = folder.path().join(name);
             write_color(&path, &image, &[]).unwrap();
             let back = read_color(&path).unwrap();

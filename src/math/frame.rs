@@ -26,9 +26,13 @@ impl Frame {
 
     /// The frame around `n` whose x axis follows `tangent` as closely as it can.
     pub fn along(n: Vec3, tangent: Vec3) -> Self {
-        match (tangent - n * n.dot(tangent)).try_normalize() {
-            Some(s) => Self { s, t: n.cross(s), n },
-            None => Self::around(n),
+        let across = tangent - n * n.dot(tangent);
+        // What is left of a tangent along the normal is rounding alone.
+        if across.length_squared() > 1e-8 * tangent.length_squared() {
+            let s = across.normalize();
+            Self { s, t: n.cross(s), n }
+        } else {
+            Self::around(n)
         }
     }
 

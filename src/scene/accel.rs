@@ -12,6 +12,7 @@ use crate::math::Vec3;
 pub struct Accel {
     scene: Committed,
     bounds: Bounds,
+    size: f32,
     version: (u32, u32, u32),
 }
 
@@ -35,7 +36,8 @@ impl Accel {
                 }
             };
         }
-        Ok(Self { scene: builder.commit()?, bounds, version: device.version() })
+        let (_, radius) = bounds.sphere();
+        Ok(Self { scene: builder.commit()?, bounds, size: 2.0 * radius, version: device.version() })
     }
 
     /// The first hit along a ray.
@@ -61,6 +63,11 @@ impl Accel {
     pub fn blocked_to_infinity(&self, from: Vec3, direction: Vec3) -> bool {
         let (origin, direction) = (from.to_array(), direction.to_array());
         self.scene.occluded(&embree::Ray { origin, t_near: 0.0, direction, t_far: f32::INFINITY })
+    }
+
+    /// Diameter of the sphere around everything.
+    pub fn size(&self) -> f32 {
+        self.size
     }
 
     /// The box around everything.

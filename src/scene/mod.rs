@@ -116,14 +116,20 @@ impl Scene {
         let instance = &self.instances[hit.geometry as usize];
         let mut surface = instance.geometry.surface(&hit, ray, instance.bsdf.needs_derivatives());
         surface.instance = hit.geometry;
+        surface.epsilon = self.epsilon(surface.p);
         Some(surface)
+    }
+
+    fn epsilon(&self, p: Vec3) -> f32 {
+        surface::epsilon(p, self.accel.size())
     }
 
     /// Whether light passes between a surface and a point on an emitter.
     pub fn visible(&self, from: &Surface, point: &LightPoint) -> bool {
         match point.position {
-            emitter::Position::Surface { p, n, epsilon } => {
-                !self.accel.blocked(from.leave(p - from.p), surface::offset(p, n, epsilon, from.p - p))
+            emitter::Position::Surface { p, n } => {
+                let end = surface::offset(p, n, self.epsilon(p), from.p - p);
+                !self.accel.blocked(from.leave(p - from.p), end)
             }
             emitter::Position::Infinity { direction } => {
                 !self.accel.blocked_to_infinity(from.leave(direction), direction)

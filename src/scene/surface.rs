@@ -26,13 +26,15 @@ pub struct Surface {
     pub instance: u32,
 }
 
-/// Starting distance per size of coordinate: eight units in the last place cover the rounding of the
-/// interpolated position and of Embree's own intersection.
-const OFFSET_ULPS: f32 = 8.0 * f32::EPSILON;
+/// Distance at which rays start off a surface, per size of coordinate. Far more than rounding asks for: scenes
+/// are modelled with doubled and nearly coincident surfaces, and look right only in renderers that skip the
+/// second one, as Mitsuba does at this distance.
+const RAY_EPSILON: f32 = 1500.0 * 0.5 * f32::EPSILON;
 
-/// The offset for a surface element whose coordinates are at most `magnitude`.
-pub fn epsilon(magnitude: f32) -> f32 {
-    magnitude * OFFSET_ULPS
+/// How far off `p` rays start, in a scene of the given size. Where coordinates are small a length of one counts,
+/// or the scene's own size when that is smaller.
+pub fn epsilon(p: Vec3, scene_size: f32) -> f32 {
+    RAY_EPSILON * (scene_size.min(1.0) + p.abs().max_element())
 }
 
 /// `p` moved off its surface to the side that `direction` leaves on.

@@ -22,8 +22,6 @@ pub enum Position {
         p: Vec3,
         /// Normal on the emitting side.
         n: Vec3,
-        /// How far shadow rays stay off it.
-        epsilon: f32,
     },
     /// Infinitely far away.
     Infinity {
@@ -46,7 +44,7 @@ pub struct LightPoint {
 impl LightPoint {
     /// A surface that was hit, as a point of its emitter.
     pub fn on_surface(surface: &Surface, emitter: u32) -> Self {
-        let position = Position::Surface { p: surface.p, n: surface.n, epsilon: surface.epsilon };
+        let position = Position::Surface { p: surface.p, n: surface.n };
         Self { position, uv: surface.uv, emitter }
     }
 

@@ -8,7 +8,6 @@ use crate::math::discrete::Discrete;
 use crate::math::{Frame, Mat4, Vec2, Vec3, vec2, warp};
 use crate::scene::emitter::{LightPoint, Position};
 use crate::scene::load::MeshData;
-use crate::scene::surface::epsilon;
 use crate::scene::{Ray, Surface};
 
 /// Triangles with optional normals and texture coordinates, shared with Embree.
@@ -121,7 +120,7 @@ impl Mesh {
             uv: self.uv_at(triangle, weights),
             dp_du,
             dp_dv,
-            epsilon: epsilon(magnitude(corners)),
+            epsilon: 0.0,
             wi: frame.to_local(-ray.direction),
             instance: 0,
         }
@@ -159,7 +158,7 @@ impl Mesh {
         let weights = [1.0 - b.x - b.y, b.x, b.y];
         let p = corners[0] * weights[0] + corners[1] * weights[1] + corners[2] * weights[2];
         let (n, _) = self.normals_at(triangle, corners, weights);
-        let position = Position::Surface { p, n, epsilon: epsilon(magnitude(corners)) };
+        let position = Position::Surface { p, n };
         Some(LightPoint { position, uv: self.uv_at(triangle, weights), emitter: 0 })
     }
 
@@ -167,10 +166,6 @@ impl Mesh {
     pub fn pdf(&self, from: Vec3, point: &LightPoint) -> f32 {
         point.area_to_solid_angle(from, 1.0 / self.area())
     }
-}
-
-fn magnitude(corners: [Vec3; 3]) -> f32 {
-    corners.into_iter().fold(Vec3::ZERO, |largest, corner| largest.max(corner.abs())).max_element()
 }
 
 fn angle_weighted_normals(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<Vec3> {

@@ -9,7 +9,6 @@ use crate::math::{Frame, Mat4, Vec2, Vec3, vec2, vec3, warp};
 use crate::scene::emitter::{LightPoint, Position};
 use crate::scene::load::props::Object;
 use crate::scene::load::{Loader, Plugin};
-use crate::scene::surface::epsilon;
 use crate::scene::{Ray, Surface};
 
 /// `sphere`: centre and radius, then `to_world`.
@@ -53,11 +52,6 @@ pub struct Sphere {
 }
 
 impl Sphere {
-    fn epsilon(&self) -> f32 {
-        // Embree's sphere intersection is less exact than its triangles: allow four times as much.
-        4.0 * epsilon(self.center.abs().max_element() + self.radius)
-    }
-
     fn uv(&self, outward: Vec3) -> Vec2 {
         let local = self.to_object.transform_vector3(outward).normalize_or(Vec3::Z);
         let phi = local.y.atan2(local.x);
@@ -78,7 +72,7 @@ impl Sphere {
             uv: self.uv(outward),
             dp_du,
             dp_dv,
-            epsilon: self.epsilon(),
+            epsilon: 0.0,
             wi: frame.to_local(-ray.direction),
             instance: 0,
         }
@@ -114,11 +108,7 @@ impl Sphere {
     }
 
     fn point(&self, outward: Vec3) -> LightPoint {
-        let position = Position::Surface {
-            p: self.center + outward * self.radius,
-            n: outward * self.side,
-            epsilon: self.epsilon(),
-        };
+        let position = Position::Surface { p: self.center + outward * self.radius, n: outward * self.side };
         LightPoint { position, uv: self.uv(outward), emitter: 0 }
     }
 

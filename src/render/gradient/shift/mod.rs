@@ -3,6 +3,7 @@
 pub mod half_vector;
 pub mod reconnect;
 
+use self::half_vector::Copied;
 use self::reconnect::Connection;
 use super::base_path::{BasePath, Vertex};
 use crate::math::{Rgb, Vec3};
@@ -57,6 +58,32 @@ impl Difference {
         }
         self.0 += (offset - base) / (density + shifted);
     }
+
+    /// A contribution of which the offset has its last segment for itself, or none. `scale` is what both are
+    /// divided by besides densities, inverted.
+    fn pair_with_end(&mut self, base: Rgb, prefix: Prefix, scale: f32, density: f32, end: Option<End>) {
+        match end {
+            Some(end) => {
+                let offset = prefix.throughput * end.value * end.radiance * (end.jacobian * scale);
+                self.pair(base, offset, density, prefix.ratio * end.jacobian * (end.light_pdf + end.pdf));
+            }
+            None => self.base_only(base, density),
+        }
+    }
+}
+
+/// The offset's own last segment, to an emitter.
+pub struct End {
+    /// f cos at the offset's vertex.
+    pub value: Rgb,
+    /// Density per solid angle of scattering there, or probability of a delta lobe.
+    pub pdf: f32,
+    /// Density per solid angle of choosing the point from there; 0 after a delta lobe.
+    pub light_pdf: f32,
+    /// Radiance received.
+    pub radiance: Rgb,
+    /// dω' / dω.
+    pub jacobian: f32,
 }
 
 /// Reconnection where both paths scatter diffusely, half-vector copies elsewhere.
@@ -114,18 +141,12 @@ impl Shift {
             }
             State::Apart(prefix, surface) => {
                 let roughness = scene.bsdf(&surface).roughness(&surface);
-                // The last segment of such a path is half-vector copied: scattering alone samples it.
-                if !self.is_diffuse(vertex.roughness) || !self.is_diffuse(roughness) {
-                    return;
-                }
-                match reconnect::to_light(scene, &vertex.surface, &surface, point) {
-                    Some(end) => {
-                        let offset = prefix.throughput * end.value * end.radiance * end.jacobian;
-                        let shifted = prefix.ratio * end.jacobian * (end.light_pdf + end.pdf);
-                        difference.pair(base, offset, density, shifted);
-                    }
-                    None => difference.base_only(base, density),
-                }
+                let end = if self.is_diffuse(vertex.roughness) && self.is_diffuse(roughness) {
+                    reconnect::to_light(scene, &vertex.surface, &surface, point)
+                } else {
+                    half_vector::to_light(scene, &vertex.surface, *wo, Lobe::Smooth, &surface, point)
+                };
+                difference.pair_with_end(base, prefix, 1.0, density, end);
             }
         }
     }
@@ -161,17 +182,14 @@ impl Shift {
                 (next, next)
             }
             State::Apart(prefix, surface) => {
-                let offset_roughness = scene.bsdf(&surface).roughness(&surface);
-                let connectable =
-                    self.scatters_diffusely(scatter.bsdf.lobe, vertex.roughness) && self.is_diffuse(offset_roughness);
-                if connectable {
-                    self.advance_connectable(scene, segment, prefix, &surface, next, difference)
-                } else {
-                    let next = self.extend(scene, segment, prefix, &surface);
-                    segment.add_half_vector(scene, &next, difference);
-                    let state = next.map_or(State::Failed, Extended::state);
-                    (state, state)
+                let roughness = scene.bsdf(&surface).roughness(&surface);
+                if self.scatters_diffusely(scatter.bsdf.lobe, vertex.roughness) && self.is_diffuse(roughness) {
+                    return self.advance_connectable(scene, segment, prefix, &surface, next, difference);
                 }
+                let extended = self.extend(scene, segment, prefix, &surface);
+                segment.add_extended_emission(scene, prefix, &surface, &extended, difference);
+                let state = extended.map_or(State::Failed, Extended::state);
+                (state, state)
             }
         }
     }
@@ -230,11 +248,11 @@ impl Shift {
     /// Copies the half vector of a segment's first vertex and finds what the offset meets.
     fn extend(&self, scene: &Scene, segment: Segment, prefix: Prefix, surface: &Surface) -> Option<Extended> {
         let Scatter { bsdf, survival } = segment.scatter;
-        let copied = half_vector::copy(scene, &segment.vertex.surface, bsdf, surface)?;
+        let copied = half_vector::copy(scene, &segment.vertex.surface, bsdf.wo, bsdf.lobe, surface)?;
         let value = copied.value * (copied.jacobian / (bsdf.pdf * survival));
         let prefix = prefix.extended(value, copied.pdf * copied.jacobian / bsdf.pdf)?;
         let ray = surface.ray(copied.wo);
-        Some(Extended { prefix, direction: ray.direction, hit: scene.intersect(ray) })
+        Some(Extended { prefix, copied, direction: ray.direction, hit: scene.intersect(ray) })
     }
 }
 
@@ -242,6 +260,7 @@ impl Shift {
 #[derive(Clone, Copy)]
 struct Extended {
     prefix: Prefix,
+    copied: Copied,
     direction: Vec3,
     hit: Option<Surface>,
 }
@@ -297,31 +316,35 @@ impl Segment<'_> {
         emission: &Emission,
         difference: &mut Difference,
     ) {
-        let base = self.base(emission);
-        let density = self.scatter.bsdf.pdf + emission.light_pdf;
-        match reconnect::to_light(scene, &self.vertex.surface, surface, &emission.point) {
-            Some(end) => {
-                let offset = prefix.throughput * end.value * end.radiance * (end.jacobian / self.scatter.survival);
-                difference.pair(base, offset, density, prefix.ratio * end.jacobian * (end.light_pdf + end.pdf));
-            }
-            None => difference.base_only(base, density),
-        }
+        let end = reconnect::to_light(scene, &self.vertex.surface, surface, &emission.point);
+        self.add_emission_with_end(prefix, emission, end, difference);
     }
 
-    /// Emission met by both paths on their own ways; scattering alone samples it.
-    fn add_half_vector(&self, scene: &Scene, extended: &Option<Extended>, difference: &mut Difference) {
+    fn add_emission_with_end(
+        &self,
+        prefix: Prefix,
+        emission: &Emission,
+        end: Option<End>,
+        difference: &mut Difference,
+    ) {
+        let density = self.scatter.bsdf.pdf + emission.light_pdf;
+        difference.pair_with_end(self.base(emission), prefix, 1.0 / self.scatter.survival, density, end);
+    }
+
+    /// Emission met by both paths on their own ways.
+    fn add_extended_emission(
+        &self,
+        scene: &Scene,
+        prefix: Prefix,
+        surface: &Surface,
+        extended: &Option<Extended>,
+        difference: &mut Difference,
+    ) {
         let Some(emission) = &self.vertex.emission else { return };
-        let pdf = self.scatter.bsdf.pdf;
-        let base = self.base(emission);
-        let Some(Extended { prefix, direction, hit }) = extended else { return difference.base_only(base, pdf) };
-        let at_infinity = matches!(emission.point.position, crate::scene::emitter::Position::Infinity { .. });
-        let point = match hit {
-            Some(hit) if !at_infinity => scene.light_point(hit),
-            None if at_infinity => scene.environment(*direction),
-            _ => None,
-        };
-        let radiance = point.map_or(Rgb::ZERO, |point| scene.radiance(&point, -*direction));
-        // The prefix already holds this segment, divided by the base's density for it.
-        difference.pair(base, prefix.throughput * radiance * pdf, pdf, prefix.ratio * pdf);
+        let delta = self.scatter.bsdf.lobe.is_delta();
+        let end = extended.as_ref().and_then(|found| {
+            half_vector::end(scene, &found.copied, delta, surface, found.direction, found.hit.as_ref(), &emission.point)
+        });
+        self.add_emission_with_end(prefix, emission, end, difference);
     }
 }

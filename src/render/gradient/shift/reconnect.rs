@@ -1,6 +1,7 @@
 //! Joining the base path at its next vertex. Jacobians are in solid angle at the vertex that is left, so they are
 //! the ratio of the solid angles under which the two paths see the same piece of surface.
 
+use super::End;
 use crate::math::{Rgb, Vec3};
 use crate::scene::emitter::LightPoint;
 use crate::scene::{Scene, Surface};
@@ -47,20 +48,6 @@ pub fn jacobian(base: Vec3, offset: Vec3, target: &Surface) -> f32 {
         target.n.dot(to).abs() / (distance_squared * distance_squared.sqrt())
     };
     solid_angle(offset) / solid_angle(base)
-}
-
-/// A segment from the offset's vertex to the base path's emitter point.
-pub struct End {
-    /// f cos at the offset's vertex.
-    pub value: Rgb,
-    /// Density per solid angle of scattering there.
-    pub pdf: f32,
-    /// Density per solid angle of choosing the point from there.
-    pub light_pdf: f32,
-    /// Radiance received.
-    pub radiance: Rgb,
-    /// dω' / dω; 1 for a point at infinity.
-    pub jacobian: f32,
 }
 
 /// From `offset` to the point that lights `base`. `None` when it is blocked or carries nothing.

@@ -1,0 +1,29 @@
+# Two commands do everything on Debian 12 and 13: `make demo` and `make test`.
+
+# What the build links against, and what the tests and CI call. apt-get names, the same on both releases.
+PACKAGES = g++ pkg-config libclang-dev libembree-dev libopenimageio-dev
+SCENE = scenes/cornell-box/scene.xml
+
+.PHONY: demo test packages check validate
+
+demo: packages
+	cargo build --release
+	mkdir -p demo
+	target/release/fluxion render $(SCENE) --size 512x512 --spp 32 -o demo/cornell-box.exr -o demo/cornell-box.png \
+		--layers demo/cornell-box-layers.exr
+	@echo "look at demo/cornell-box.png; demo/cornell-box.exr holds the radiance"
+
+test: packages
+	cargo test --release
+	cargo build --release
+	target/release/fluxion validate
+
+# Format, lints and documentation, as CI checks them.
+check: packages
+	cargo fmt --check
+	cargo clippy --release --all-targets -- -D warnings
+	RUSTDOCFLAGS="-D warnings" cargo doc --no-deps
+
+# Installs what is missing, through sudo when not root. Elsewhere than on Debian it says what is needed.
+packages:
+	@sh .ci/packages $(PACKAGES)

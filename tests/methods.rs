@@ -1,0 +1,169 @@
+//! The contract of every reconstruction of the table, on frames made by hand.
+
+use fluxion::error::Error;
+use fluxion::film::{BINS, Frame, Layer};
+use fluxion::image::Image;
+use fluxion::math::{Rgb, rng, vec3};
+use fluxion::reconstruct::{Context, METHODS, Method, parse, solve};
+
+const SIZES: [(usize, usize); 6] = [(1, 1), (1, 9), (7, 1), (2, 2), (13, 17), (61, 40)];
+
+fn picture(width: usize, height: usize) -> Image {
+    Image::from_rgb(width, height, |x, y| {
+        let (x, y) = (x as f32, y as f32);
+        vec3(1.5 + (0.3 * x).sin(), 2.0 + (0.2 * x * y).cos(), 0.3 + f32::from(u8::from(x > 5.0)))
+    })
+}
+
+fn shifted(image: &Image, step: (usize, usize)) -> Image {
+    Image::from_rgb(image.width, image.height, |x, y| {
+        let (a, b) = (x + step.0, y + step.1);
+        if a < image.width && b < image.height { image.rgb(a, b) - image.rgb(x, y) } else { Rgb::ZERO }
+    })
+}
+
+/// A frame with all layers whose colour and differences are exactly those of `image`.
+fn exact(image: &Image) -> Frame {
+    let (width, height) = (image.width, image.height);
+    let mut frame = Frame::new(width, height);
+    let constant = |channels: usize, value: f32| Image {
+        data: vec![value; width * height * channels],
+        ..Image::new(width, height, channels)
+    };
+    for layer in Layer::all() {
+        frame.set(layer, constant(layer.info().channels.len(), 0.0));
+    }
+    frame.set(Layer::Color, image.clone());
+    frame.set(Layer::Albedo, constant(3, 0.5));
+    frame.set(Layer::Normal, constant(3, 0.57));
+    frame.set(Layer::Depth, constant(1, 3.0));
+    frame.set(Layer::Samples, constant(1, 64.0));
+    frame.set(Layer::Dx, shifted(image, (1, 0)));
+    frame.set(Layer::Dy, shifted(image, (0, 1)));
+    for k in 0..BINS as u8 {
+        frame.set(Layer::BinColor(k), image.clone());
+        frame.set(Layer::BinDx(k), shifted(image, (1, 0)));
+        frame.set(Layer::BinDy(k), shifted(image, (0, 1)));
+    }
+    frame
+}
+
+fn noisy(width: usize, height: usize, scale: f32) -> Frame {
+    let mut frame = exact(&picture(width, height));
+    for (seed, layer) in [(1, Layer::Color), (2, Layer::Dx), (3, Layer::Dy)] {
+        let mut image = frame.get(layer).unwrap().clone();
+        for (i, value) in image.data.iter_mut().enumerate() {
+            *value = scale * (*value + rng::unit(rng::combine(seed, i as u64)) - 0.5);
+        }
+        frame.set(layer, image);
+    }
+    for layer in [Layer::ColorVariance, Layer::DxVariance, Layer::DyVariance] {
+        let value = scale * scale / 12.0;
+        frame.set(layer, Image { data: vec![value; width * height * 3], ..Image::new(width, height, 3) });
+    }
+    frame
+}
+
+fn run(method: &Method, frame: &Frame) -> Result<Image, Error> {
+    let method = parse(method.id)?;
+    solve(method.as_ref(), frame, &Context { progress: &|_, _| {} }).map(|solution| solution.image)
+}
+
+fn assert_close(method: &Method, a: &Image, b: &Image, tolerance: f32) {
+    for (a, b) in a.data.iter().zip(&b.data) {
+        assert!((a - b).abs() <= tolerance * b.abs().max(1e-3), "{}: {a} instead of {b}", method.id);
+    }
+}
+
+#[test]
+fn a_noise_free_frame_is_a_fixed_point_at_every_size() {
+    for method in METHODS {
+        for (width, height) in SIZES {
+            let image = picture(width, height);
+            assert_close(method, &run(method, &exact(&image)).unwrap(), &image, 1e-4);
+            let flat = Image::from_rgb(width, height, |_, _| vec3(0.25, 3.0, 0.0));
+            assert_close(method, &run(method, &exact(&flat)).unwrap(), &flat, 1e-5);
+        }
+    }
+}
+
+#[test]
+fn exposure_does_not_matter() {
+    for method in METHODS {
+        let normal = run(method, &noisy(23, 14, 1.0)).unwrap();
+        for scale in [1e-6, 1e6] {
+            let mut scaled = run(method, &noisy(23, 14, scale)).unwrap();
+            scaled.data.iter_mut().for_each(|value| *value /= scale);
+            assert_close(method, &scaled, &normal, 1e-3);
+        }
+    }
+}
+
+#[test]
+fn directly_seen_emitters_are_added_after_reconstruction() {
+    for method in METHODS {
+        let mut frame = exact(&picture(9, 9));
+        let without = run(method, &frame).unwrap();
+        let mut direct = Image::new(9, 9, 3);
+        direct.pixel_mut(4, 4).copy_from_slice(&[100.0, 50.0, 25.0]);
+        frame.set(Layer::Direct, direct.clone());
+        let mut expected = without;
+        expected.add(&direct);
+        assert_close(method, &run(method, &frame).unwrap(), &expected, 1e-6);
+    }
+}
+
+#[test]
+fn threads_do_not_matter() {
+    for method in METHODS {
+        let on = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| run(method, &noisy(40, 33, 1.0)).unwrap())
+        };
+        assert!(on(1) == on(2), "{}", method.id);
+    }
+}
+
+#[test]
+fn a_missing_layer_is_named_with_the_way_to_get_it() {
+    for method in METHODS {
+        let needs = parse(method.id).unwrap().needs();
+        let mut frame = Frame::new(3, 3);
+        assert!(run(method, &frame).unwrap_err().to_string().contains("`R, G, B`"));
+        frame.set(Layer::Color, Image::new(3, 3, 3));
+        if needs.edges {
+            let message = run(method, &frame).unwrap_err().to_string();
+            assert!(message.contains("dx.R") && message.contains("--method"), "{message}");
+        }
+    }
+}
+
+#[test]
+fn values_that_are_not_finite_are_errors_that_name_the_pixel() {
+    for method in METHODS {
+        for poison in [f32::NAN, f32::INFINITY] {
+            let mut frame = noisy(5, 4, 1.0);
+            let mut color = frame.get(Layer::Color).unwrap().clone();
+            color.pixel_mut(3, 2)[1] = poison;
+            frame.set(Layer::Color, color);
+            let message = run(method, &frame).unwrap_err().to_string();
+            assert!(message.contains("channel G") && message.contains("3,2"), "{message}");
+        }
+    }
+}
+
+#[test]
+fn parameters_are_checked() {
+    for (text, expected) in [
+        ("nosuch", "there are primal, l2"),
+        ("l2:beta=1", "it has alpha"),
+        ("l2:alpha", "not like name=value"),
+        ("l2:alpha=0", "must be a number"),
+        ("l2:alpha=nan", "must be a number"),
+        ("primal:x=1", "it has none"),
+    ] {
+        let message = parse(text).err().unwrap_or_else(|| panic!("{text} is taken")).to_string();
+        assert!(message.contains(expected), "{text}: {message}");
+    }
+    assert!(parse("l2:alpha=0.5").is_ok());
+}
