@@ -1,0 +1,172 @@
+//! The program as a user runs it.
+
+use std::path::Path;
+
+use assert_cmd::Command;
+use fluxion::image::io::read_color;
+
+fn fluxion(folder: &Path) -> Command {
+    let mut command = Command::cargo_bin("fluxion").unwrap();
+    command.current_dir(folder);
+    command
+}
+
+fn scene(name: &str) -> String {
+    format!("{}/scenes/{name}/scene.xml", env!("CARGO_MANIFEST_DIR"))
+}
+
+fn stderr(command: &mut Command) -> (i32, String) {
+    let output = command.output().unwrap();
+    (output.status.code().unwrap_or(-1), String::from_utf8_lossy(&output.stderr).into_owned())
+}
+
+#[test]
+fn reconstructing_saved_layers_gives_the_rendered_image() {
+    let folder = tempfile::tempdir().unwrap();
+    for method in ["primal", "l2", "l2:alpha=0.5"] {
+        let arguments = [
+            "-o",
+            "a.exr",
+            "-o",
+            "a.png",
+            "--size",
+            "40x30",
+            "--spp",
+            "5",
+            "--layers",
+            "layers.exr",
+            "--method",
+            method,
+        ];
+        fluxion(folder.path()).args(["render", &scene("cornell-box")]).args(arguments).assert().success();
+        fluxion(folder.path())
+            .args(["reconstruct", "layers.exr", "-o", "b.exr", "--method", method])
+            .assert()
+            .success();
+        let [a, b] = ["a.exr", "b.exr"].map(|name| read_color(&folder.path().join(name)).unwrap());
+        assert!(a == b, "{method}");
+        assert_eq!(read_color(&folder.path().join("a.png")).unwrap().shape(), (40, 30, 3));
+    }
+}
+
+#[test]
+fn the_seed_and_not_the_threads_decide_the_bits() {
+    let folder = tempfile::tempdir().unwrap();
+    let render = |name: &str, extra: [&str; 4]| {
+        let arguments = ["-o", name, "--size", "33x20", "--spp", "3", "-q"];
+        fluxion(folder.path()).args(["render", &scene("glossy-metal")]).args(arguments).args(extra).assert().success();
+        read_color(&folder.path().join(name)).unwrap()
+    };
+    let one = render("1.exr", ["--seed", "4", "--threads", "1"]);
+    assert!(one == render("2.exr", ["--seed", "4", "--threads", "2"]));
+    assert!(one != render("3.exr", ["--seed", "5", "--threads", "2"]));
+}
+
+#[test]
+fn figures_come_as_json_with_the_promised_keys() {
+    let folder = tempfile::tempdir().unwrap();
+    let arguments = ["-o", "a.exr", "--size", "16x16", "--spp", "2", "--json", "stats.json"];
+    fluxion(folder.path()).args(["render", &scene("cornell-box")]).args(arguments).assert().success();
+    let text = std::fs::read_to_string(folder.path().join("stats.json")).unwrap();
+    let stats: serde_json::Value = serde_json::from_str(&text).unwrap();
+    for key in ["load", "render", "develop", "reconstruct", "write"] {
+        assert!(stats["seconds"][key].as_f64().unwrap() >= 0.0, "{key}");
+    }
+    assert_eq!(
+        (stats["spp"].as_u64(), stats["samples"].as_u64(), stats["rejected"].as_u64()),
+        (Some(2), Some(512), Some(0))
+    );
+    assert!(stats["peak_bytes"].as_u64().unwrap() > 1 << 20);
+    assert_eq!((stats["method"].as_str(), stats["plan"].as_str()), (Some("l2"), Some("+gradients -features -bins")));
+    let output =
+        fluxion(folder.path()).args(["compare", "a.exr", "a.exr", "--json", "--map", "map.png"]).output().unwrap();
+    let figures: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    for (key, value) in [("relmse", 0.0), ("smape", 0.0), ("flip", 0.0), ("mse", 0.0), ("mean_ratio", 1.0)] {
+        assert_eq!(figures[key].as_f64(), Some(value), "{key}");
+    }
+    assert!(folder.path().join("map.png").is_file());
+}
+
+#[test]
+fn a_time_budget_is_kept_roughly_and_a_replayed_sample_is_printed() {
+    let folder = tempfile::tempdir().unwrap();
+    let start = std::time::Instant::now();
+    let arguments = ["-o", "a.hdr", "--size", "32x32", "--time", "0.5s"];
+    fluxion(folder.path()).args(["render", &scene("cornell-box")]).args(arguments).assert().success();
+    assert!(start.elapsed().as_secs_f64() > 0.4);
+    let output =
+        fluxion(folder.path()).args(["render", &scene("cornell-box"), "--replay", "100,100,3"]).output().unwrap();
+    assert!(String::from_utf8_lossy(&output.stdout).contains("edges"));
+}
+
+#[test]
+fn the_program_tells_what_it_knows() {
+    let folder = tempfile::tempdir().unwrap();
+    for (arguments, expected) in [
+        (vec!["info", "--methods"], "alpha=0.2"),
+        (vec!["info", "--layers"], "`dx.R` `dx.G` `dx.B`"),
+        (vec!["info", "--plugins"], "`roughconductor`"),
+        (vec!["info", "--metrics"], "relmse"),
+        (vec!["info", &scene("cornell-box"), "--method", "primal"], "gradients  left out"),
+        (vec!["--version"], "fluxion "),
+    ] {
+        let output = fluxion(folder.path()).args(&arguments).output().unwrap();
+        let text = String::from_utf8_lossy(&output.stdout).into_owned();
+        assert!(output.status.success() && text.contains(expected), "{arguments:?}: {text}");
+    }
+}
+
+#[test]
+fn mistakes_are_told_apart_and_leave_nothing_behind() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("cut.exr"), b"v/1\x01").unwrap();
+    std::fs::write(folder.path().join("bad.xml"), "<scene version=\"3.0.0\">\n<shape type=\"teapot\"/></scene>")
+        .unwrap();
+    let cornell = scene("cornell-box");
+    for (arguments, code, expected) in [
+        (vec!["render", "no.xml", "-o", "a.exr"], 1, "no.xml"),
+        (vec!["render", "bad.xml", "-o", "a.exr"], 1, "bad.xml:2: shape `teapot` is not known; there are obj"),
+        (vec!["render", &cornell, "-o", "a.tiff8"], 1, "not one of exr"),
+        (vec!["render", &cornell, "-o", "no/folder/a.exr"], 1, "cannot write"),
+        (vec!["render", &cornell, "-o", "a.exr", "--method", "magic"], 2, "there are primal, l2"),
+        (vec!["render", &cornell, "-o", "a.exr", "--size", "0x5"], 2, "positive"),
+        (vec!["render", &cornell, "-o", "a.exr", "--size", "999999x999999"], 1, "pixels"),
+        (vec!["render", &cornell, "-o", "a.exr", "--spp", "0"], 2, "--spp"),
+        (vec!["render", &cornell], 2, "--output"),
+        (vec!["render", &cornell, "--replay", "5000,1,1"], 2, "outside the film"),
+        (vec!["reconstruct", "cut.exr", "-o", "a.exr"], 1, "cut.exr"),
+        (vec!["compare", "cut.exr", "cut.exr"], 1, "cut.exr"),
+        (vec!["info"], 2, "scene file"),
+    ] {
+        let (found, text) = stderr(fluxion(folder.path()).args(&arguments));
+        assert_eq!(found, code, "{arguments:?}: {text}");
+        assert!(text.contains(expected), "{arguments:?}: {text}");
+        assert!(!folder.path().join("a.exr").exists(), "{arguments:?} left a file");
+    }
+}
+
+#[test]
+fn a_missing_layer_is_named_with_the_flag_that_renders_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let arguments = ["-o", "a.exr", "--size", "8x8", "--spp", "1", "--layers", "l.exr", "--method", "primal"];
+    fluxion(folder.path()).args(["render", &scene("cornell-box")]).args(arguments).assert().success();
+    let (code, text) = stderr(fluxion(folder.path()).args(["reconstruct", "l.exr", "-o", "b.exr", "--method", "l2"]));
+    assert!(code == 1 && text.contains("dx.R") && text.contains("--method l2"), "{text}");
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupt_ends_after_the_running_tiles_and_writes_what_is_there() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut child = std::process::Command::new(assert_cmd::cargo::cargo_bin("fluxion"))
+        .current_dir(folder.path())
+        .args(["render", &scene("cornell-box"), "-o", "a.exr", "--spp", "100000"])
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    std::thread::sleep(std::time::Duration::from_millis(1500));
+    std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    assert!(child.wait().unwrap().success());
+    let image = read_color(&folder.path().join("a.exr")).unwrap();
+    assert!(image.data.iter().sum::<f32>() > 0.0);
+}

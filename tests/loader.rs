@@ -1,0 +1,164 @@
+//! Scene files that are wrong, odd or hostile: an error that names the place, or a correct image; never a panic.
+
+mod common;
+
+use common::{film, scene, sensor, try_scene};
+use fluxion::film::{Layer, Needs};
+use fluxion::scene::load;
+use proptest::prelude::*;
+
+fn message(body: &str) -> String {
+    try_scene(body).err().unwrap_or_else(|| panic!("taken: {body}")).to_string()
+}
+
+#[test]
+fn mistakes_are_named_with_their_line() {
+    let camera = sensor("0,0,4", 4, 4).replace('\n', " ");
+    for (body, expected) in [
+        ("<shape type=\"sphere\"/>", "scene.xml: the scene has no sensor"),
+        ("<shape type=\"spere\"/>", "scene.xml:2: shape `spere` is not known; there are obj, ply"),
+        (
+            "\n<shape type=\"sphere\"><float name=\"radiu\" value=\"1\"/></shape>",
+            "scene.xml:3: shape `sphere` has no property `radiu`; it takes: center, radius",
+        ),
+        ("<shape type=\"sphere\"><float name=\"radius\" value=\"one\"/></shape>", "`one` is not a finite number"),
+        ("<shape type=\"sphere\"><float name=\"radius\" value=\"nan\"/></shape>", "`nan` is not a finite number"),
+        ("<shape type=\"sphere\"><float name=\"radius\" value=\"-1\"/></shape>", "`radius` must be positive"),
+        ("<shape type=\"sphere\"><string name=\"radius\" value=\"1\"/></shape>", "`radius` must be a number"),
+        ("<shape type=\"sphere\"><ref id=\"nobody\"/></shape>", "nothing has the id `nobody`"),
+        ("<bsdf type=\"diffuse\" id=\"a\"/><bsdf type=\"diffuse\" id=\"a\"/>", "the id `a` is given twice"),
+        (
+            "<bsdf type=\"twosided\" id=\"a\"><ref id=\"a\"/></bsdf><shape type=\"sphere\"><ref id=\"a\"/></shape>",
+            "refer to itself",
+        ),
+        ("<shape type=\"obj\"><string name=\"filename\" value=\"no.obj\"/></shape>", "no file `no.obj`"),
+        ("<include filename=\"scene.xml\"/>", "includes itself"),
+        ("<include filename=\"other.xml\"/>", "no file `other.xml`"),
+        ("<float name=\"x\" value=\"$unknown\"/>", "parameter `$unknown` has no value"),
+        (
+            "<shape type=\"cube\"><transform name=\"to_world\"><scale value=\"0\"/></transform></shape>",
+            "cannot be inverted",
+        ),
+        (
+            "<shape type=\"cube\"><transform name=\"to_world\"><skew value=\"0\"/></transform></shape>",
+            "unknown transform <skew>",
+        ),
+        ("<medium type=\"homogeneous\"/>", "<medium> in a scene"),
+        ("<integrator type=\"bdpt\"/>", "so use `path`"),
+        ("<emitter type=\"constant\"/><emitter type=\"constant\"/>CAMERA", "more than one environment"),
+        ("CAMERACAMERA", "a second sensor"),
+        (
+            "<shape type=\"sphere\"><bsdf type=\"twosided\"><bsdf type=\"dielectric\"/></bsdf></shape>",
+            "transmits light",
+        ),
+        (
+            "<shape type=\"sphere\"><bsdf type=\"dielectric\"><string name=\"int_ior\" value=\"jelly\"/></bsdf></shape>",
+            "no known material",
+        ),
+        ("<shape type=\"sphere\"", "scene.xml:"),
+    ] {
+        let text = message(&body.replace("CAMERA", &camera));
+        assert!(text.contains(expected), "{body}: {text}");
+    }
+}
+
+/// Mean colour of a small render with directly seen emitters.
+fn mean(body: &str) -> f32 {
+    let scene = scene(body);
+    let frame = film(&scene, 16, 1, Needs { edges: true, features: true, bins: false }).develop();
+    assert_eq!(frame.get(Layer::Rejected).unwrap().data.iter().sum::<f32>(), 0.0);
+    let sum = |layer| frame.get(layer).unwrap().data.iter().sum::<f32>();
+    (sum(Layer::Color) + sum(Layer::Direct)) / frame.get(Layer::Color).unwrap().data.len() as f32
+}
+
+#[test]
+fn scenes_without_light_are_black_and_without_shapes_show_the_sky() {
+    let camera = sensor("0,0,4", 8, 8);
+    assert_eq!(mean(&format!("{camera}<shape type=\"sphere\"/>")), 0.0);
+    assert_eq!(mean(&camera), 0.0);
+    assert_eq!(mean(&format!("{camera}<emitter type=\"constant\"/>")), 1.0);
+}
+
+#[test]
+fn depth_counts_as_in_the_documentation() {
+    let body = |depth: i32| {
+        format!(
+            "{}<integrator type=\"path\"><integer name=\"max_depth\" value=\"{depth}\"/></integrator>\
+             <emitter type=\"constant\"/><shape type=\"rectangle\"><transform name=\"to_world\"><scale value=\"9\"/></transform></shape>",
+            sensor("0,0,4", 8, 8)
+        )
+    };
+    // A grey plane under a white sky: nothing, then half of the light by one bounce.
+    assert_eq!(mean(&body(0)), 0.0);
+    assert_eq!(mean(&body(1)), 0.0);
+    assert!((mean(&body(2)) - 0.5).abs() < 0.02);
+    assert!((mean(&body(-1)) - 0.5).abs() < 0.02);
+}
+
+fn with_mesh(obj: &str) -> fluxion::error::Result<fluxion::scene::Scene> {
+    with_file("m.obj", "obj", obj.as_bytes())
+}
+
+fn with_file(name: &str, plugin: &str, bytes: &[u8]) -> fluxion::error::Result<fluxion::scene::Scene> {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join(name), bytes).unwrap();
+    let emitter = "<emitter type=\"area\"/>";
+    let body = format!(
+        "<scene version=\"3.0.0\">{}<shape type=\"{plugin}\"><string name=\"filename\" value=\"{name}\"/>{emitter}</shape></scene>",
+        sensor("0,0,4", 4, 4)
+    );
+    let path = folder.path().join("scene.xml");
+    std::fs::write(&path, body).unwrap();
+    load::load(&path, &load::Options::default())
+}
+
+#[test]
+fn degenerate_meshes_are_harmless() {
+    for obj in [
+        "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n",
+        "v 0 0 0\nf 1 1 1\n",
+        "v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",
+        "v 1e38 0 0\nv -1e38 0 0\nv 0 1e38 0\nf 1 2 3\n",
+        "v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 0\nf 1//1 2//1 3//1\nf 1//1 2//1 2//1\n",
+        "",
+    ] {
+        let scene = with_mesh(obj).unwrap_or_else(|error| panic!("{obj}: {error}"));
+        let frame = film(&scene, 2, 1, Needs { edges: true, features: true, bins: false }).develop();
+        assert!(frame.present().all(|(_, image)| image.data.iter().all(|value| value.is_finite())), "{obj}");
+    }
+    assert!(with_mesh("v 0 0 0\nv 1 0 0\nf 1 2 9\n").is_err());
+}
+
+fn asset(name: &str) -> Vec<u8> {
+    std::fs::read(common::root().join("scenes/assets").join(name)).unwrap()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(60))]
+
+    #[test]
+    fn damaged_meshes_are_errors_or_meshes(cut in 0usize..60_000, flips in prop::collection::vec((0usize..60_000, any::<u8>()), 0..4)) {
+        for (name, plugin) in [("torus.ply", "ply"), ("torus_binary.ply", "ply"), ("torus.serialized", "serialized"), ("torus.obj", "obj")] {
+            let mut bytes = asset(name);
+            bytes.truncate(cut.max(1));
+            for (at, value) in &flips {
+                let length = bytes.len();
+                bytes[at % length] ^= value;
+            }
+            // Whatever happens, it is no panic.
+            let _ = with_file(name, plugin, &bytes);
+        }
+    }
+
+    #[test]
+    fn damaged_scene_files_are_errors_or_scenes(cut in 0usize..4000, at in 0usize..4000, value in any::<u8>()) {
+        let mut bytes = std::fs::read(common::root().join("scenes/glossy-metal/scene.xml")).unwrap();
+        bytes.truncate(cut.max(1));
+        let length = bytes.len();
+        bytes[at % length] ^= value & 0x7f;
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("scene.xml");
+        std::fs::write(&path, bytes).unwrap();
+        let _ = load::load(&path, &load::Options::default());
+    }
+}
