@@ -3,16 +3,25 @@
 //! ```text
 //! scene -> render (waves of tiles) -> Film --develop--> Frame -> reconstruct -> Solution -> metrics
 //! ```
+//!
+//! A **sample** is what one camera path leaves behind; samples are dealt to **bins**. An **edge** is the difference to
+//! a neighbouring pixel, estimated from both of its ends by **shifting** paths. The **film** keeps running moments of
+//! all of it; developed, it is a **frame** of **layers**: images with names and variances. A **method** reconstructs
+//! an image from a frame, and the **plan** says what need not be computed for it.
 
 pub mod error;
-pub mod ffi;
-pub mod film;
-pub mod image;
 pub mod math;
-pub mod metrics;
-pub mod plan;
-pub mod reconstruct;
-pub mod render;
-pub mod scene;
+
+pub mod ffi;
+pub mod image;
 pub mod solve;
+
+pub mod scene;
+
+pub mod film;
+pub mod plan;
+pub mod render;
+
+pub mod metrics;
+pub mod reconstruct;
 pub mod validate;

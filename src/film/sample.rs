@@ -83,10 +83,10 @@ impl<const N: usize> Moments<N> {
     /// Adds a sample; `share` is one over the count with it.
     #[inline]
     pub fn add(&mut self, values: [f32; N], share: f32) {
-        for i in 0..N {
-            let before = values[i] - self.mean[i];
-            self.mean[i] += before * share;
-            self.deviation[i] += before * (values[i] - self.mean[i]);
+        for ((mean, deviation), value) in self.mean.iter_mut().zip(&mut self.deviation).zip(values) {
+            let before = value - *mean;
+            *mean += before * share;
+            *deviation += before * (value - *mean);
         }
     }
 

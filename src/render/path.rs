@@ -115,8 +115,7 @@ pub fn trace(scene: &Scene, sampler: &Sampler, film: Vec2, recorder: &mut impl R
         let brightest = throughput.max_element();
         let roulette = depth >= integrator.rr_depth;
         let chance = if roulette { (brightest * eta * eta).min(MAX_SURVIVAL) } else { 1.0 };
-        // Not a comparison with zero alone: throughput that is not a number ends here too.
-        if !(brightest > 0.0) || (roulette && survival >= chance) {
+        if brightest <= 0.0 || (roulette && survival >= chance) {
             break;
         }
         throughput /= chance;

@@ -178,7 +178,7 @@ fn erf_inv(x: f32) -> f32 {
         5.739_507_7e-3,
         -7.622_461_3e-3,
         9.438_870_5e-3,
-        1.001_674_1,
+        1.001_674,
         2.832_976_8,
     ];
     if w < 5.0 { polynomial(CENTRE, w - 2.5) * x } else { polynomial(TAIL, w.sqrt() - 3.0) * x }

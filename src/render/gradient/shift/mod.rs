@@ -53,7 +53,7 @@ impl Difference {
     /// A contribution of both. `base` and `offset` are f(x) and J f(y) before division by `density`, the
     /// base's, and `shifted`, J times the offset's.
     fn pair(&mut self, base: Rgb, offset: Rgb, density: f32, shifted: f32) {
-        if offset == Rgb::ZERO || !(shifted > 0.0) {
+        if offset == Rgb::ZERO || shifted <= 0.0 {
             return self.base_only(base, density);
         }
         self.0 += (offset - base) / (density + shifted);

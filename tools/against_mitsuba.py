@@ -1,0 +1,182 @@
+"""Fluxion beside Mitsuba 3: radiance, gradients, correlation and speed, as the tables of docs/results.md.
+
+    python tools/against_mitsuba.py radiance SCENES REFERENCES [SPP=512]
+    python tools/against_mitsuba.py gradients [SPP=1024]
+    python tools/against_mitsuba.py correlation SCENES REFERENCES [SPP=64]
+    python tools/against_mitsuba.py speed SCENES [SPP=16]
+    python tools/against_mitsuba.py bundled [SPP=1024]
+
+SCENES is a folder with NAME/scene.xml; REFERENCES one with NAME.exr (mean) and NAME_var.exr (variance of the mean),
+box filtered. Run from the repository's top folder after `cargo build --release`. Needs PyPI openimageio and numpy, and
+mitsuba for `speed` and `bundled` (with DRJIT_LIBLLVM_PATH naming libLLVM for the LLVM variant).
+"""
+import json
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+import xml.etree.ElementTree as ET
+
+import numpy as np
+import OpenImageIO as oiio
+
+FLUXION = "target/release/fluxion"
+SIZES = {"cornell-box": (256, 256), "veach-mis": (320, 180), "veach-ajar": (320, 180), "kitchen": (320, 180),
+         "living-room": (320, 180)}
+UNIT = ["diffuse", "rough-conductor", "dielectric", "environment", "occluder", "plastic", "rough-plastic", "mask", "bump",
+        "thin-pane", "sphere-light", "mirror-rooms"]
+
+
+def read(path):
+    """Channels by name."""
+    buffer = oiio.ImageBuf(path)
+    pixels = buffer.get_pixels(oiio.FLOAT)
+    return {name: pixels[..., i].astype(np.float64) for i, name in enumerate(buffer.spec().channelnames)}
+
+
+def rgb(channels, prefix=""):
+    return np.stack([channels[prefix + c] for c in "RGB"], -1)
+
+
+def fluxion(scene, size, spp, method, seed=1, extra=()):
+    """Image, layers and statistics of a render."""
+    with tempfile.TemporaryDirectory() as folder:
+        at = lambda name: os.path.join(folder, name)
+        subprocess.run([FLUXION, "render", scene, "-o", at("o.exr"), "--layers", at("l.exr"), "--json", at("s.json"), "-q",
+                        "--size", "%dx%d" % size, "--spp", str(spp), "--seed", str(seed), "--method", method, *extra],
+                       check=True)
+        with open(at("s.json")) as file:
+            return rgb(read(at("o.exr"))), read(at("l.exr")), json.load(file)
+
+
+def z_row(name, mean, variance, reference, reference_variance):
+    """Mean ratio with its standard error, and what the differences are in standard errors."""
+    total = variance + reference_variance
+    z = np.where(np.abs(mean - reference) <= 1e-5 * reference, 0.0, (mean - reference) / np.sqrt(total + 1e-12))
+    ratio = mean.sum((0, 1)) / reference.sum((0, 1))
+    error = np.sqrt(total.sum((0, 1))) / reference.sum((0, 1))
+    print("| %s | %s | %s | %.3f | %.2f %% |" % (
+        name, " ".join("%.4f" % r for r in ratio), " ".join("%.4f" % e for e in error), np.sqrt((z * z).mean()),
+        100 * (np.abs(z) > 4).mean()), flush=True)
+
+
+def radiance(scenes, references, spp="512"):
+    print("| scene | mean ratio R G B | standard error | z rms | beyond 4 |\n|---|---|---|---|---|")
+    for name, size in SIZES.items():
+        _, layers, _ = fluxion(os.path.join(scenes, name, "scene.xml"), size, int(spp), "primal")
+        mean = rgb(layers) + rgb(layers, "direct.")
+        variance = rgb(layers, "variance.") + rgb(layers, "direct_variance.")
+        reference = os.path.join(references, name)
+        z_row(name, mean, variance, rgb(read(reference + ".exr")), rgb(read(reference + "_var.exr")))
+
+
+def gradients(spp="1024"):
+    print("| scene | edges | mean z | z rms | beyond 4 | variance of an edge over two colours |\n|---|---|---|---|---|---|")
+    for name in UNIT:
+        scene = "scenes/unit/%s/scene.xml" % name
+        _, layers, _ = fluxion(scene, (48, 36), int(spp), "l2", seed=1)
+        _, other, _ = fluxion(scene, (48, 36), 4 * int(spp), "primal", seed=2)
+        color, noise, own = rgb(other), rgb(other, "variance."), rgb(layers, "variance.")
+        z, ratio = [], []
+        for edge, axis in (("dx", 1), ("dy", 0)):
+            inside = (slice(None), slice(0, -1)) if axis == 1 else (slice(0, -1),)
+            both = lambda v: (v[:, 1:] + v[:, :-1]) if axis == 1 else (v[1:] + v[:-1])
+            mean, variance = rgb(layers, edge + ".")[inside], rgb(layers, edge + "_variance.")[inside]
+            total = variance + both(noise)
+            z.append(((mean - np.diff(color, axis=axis)) / np.sqrt(total + 1e-14))[total > 0].ravel())
+            ratio.append((variance.sum(), both(own).sum()))
+        z, ratio = np.concatenate(z), np.array(ratio).sum(0)
+        print("| %s | %d | %+.3f | %.3f | %.2f %% | %.3f |" % (name, z.size, z.mean(), np.sqrt((z * z).mean()),
+              100 * (np.abs(z) > 4).mean(), ratio[0] / ratio[1]), flush=True)
+
+
+def correlation(scenes, references, spp="64"):
+    print("| scene | relMSE of primal | relMSE of l2 | l2 / primal | floor of the reference |\n|---|---|---|---|---|")
+    for name, size in SIZES.items():
+        reference = rgb(read(os.path.join(references, name + ".exr")))
+        weight = 1 / (reference * reference + 0.01)
+        floor = (rgb(read(os.path.join(references, name + "_var.exr"))) * weight).mean()
+        image, layers, _ = fluxion(os.path.join(scenes, name, "scene.xml"), size, int(spp), "l2")
+        primal = rgb(layers) + rgb(layers, "direct.")
+        # The reference's own noise is in both figures: it is taken off.
+        error = [((one - reference) ** 2 * weight).mean() - floor for one in (primal, image)]
+        print("| %s | %.4g | %.4g | %.3f | %.2g |" % (name, *error, error[1] / error[0], floor), flush=True)
+
+
+def mitsuba_scene(mi, path, size):
+    """The scene with a box filter at another size."""
+    tree = ET.parse(path)
+    for film in tree.getroot().iter("film"):
+        for old in film.findall("rfilter"):
+            film.remove(old)
+        ET.SubElement(film, "rfilter", type="box")
+        for key, value in zip(("width", "height"), size):
+            for old in [e for e in film.findall("integer") if e.get("name") == key]:
+                old.set("value", str(value))
+    with tempfile.NamedTemporaryFile("wb", suffix=".xml", dir=".", delete=False) as file:
+        tree.write(file)
+    try:
+        # Names in the file are relative to its folder.
+        mi.file_resolver().prepend(os.path.dirname(os.path.abspath(path)))
+        return mi.load_file(file.name)
+    finally:
+        os.unlink(file.name)
+
+
+def speed(scenes, spp="16"):
+    """Millions of samples a second; the programs take turns, the median of five counts."""
+    import mitsuba as mi
+    print("| scene | path | gradient | cost of a gradient sample | scalar_rgb | llvm_ad_rgb | path / scalar | path / llvm |")
+    print("|---|---|---|---|---|---|---|---|")
+    for name in SIZES:
+        path = os.path.join(scenes, name, "scene.xml")
+        size = (512, 512) if name == "cornell-box" else (640, 360)
+        rates = {"path": [], "gradient": [], "scalar_rgb": [], "llvm_ad_rgb": []}
+        loaded = {}
+        for variant in ("scalar_rgb", "llvm_ad_rgb"):
+            mi.set_variant(variant)
+            loaded[variant] = mitsuba_scene(mi, path, size)
+            np.array(mi.render(loaded[variant], spp=1, seed=0))
+        for seed in range(5):
+            for kind, method in (("path", "primal"), ("gradient", "l2")):
+                with tempfile.TemporaryDirectory() as folder:
+                    stats = os.path.join(folder, "s.json")
+                    subprocess.run([FLUXION, "render", path, "-o", os.path.join(folder, "o.exr"), "--json", stats, "-q",
+                                    "--size", "%dx%d" % size, "--spp", spp, "--seed", str(seed), "--method", method,
+                                    "--threads", "2"], check=True)
+                    with open(stats) as file:
+                        record = json.load(file)
+                rates[kind].append(record["samples"] / record["seconds"]["render"] / 1e6)
+            for variant in loaded:
+                mi.set_variant(variant)
+                start = time.time()
+                np.array(mi.render(loaded[variant], spp=int(spp), seed=seed))
+                rates[variant].append(size[0] * size[1] * int(spp) / (time.time() - start) / 1e6)
+        m = {key: statistics.median(values) for key, values in rates.items()}
+        print("| %s | %.3f | %.3f | %.2f | %.3f | %.3f | %.2f | %.2f |" % (
+            name, m["path"], m["gradient"], m["path"] / m["gradient"], m["scalar_rgb"], m["llvm_ad_rgb"],
+            m["path"] / m["scalar_rgb"], m["path"] / m["llvm_ad_rgb"]), flush=True)
+
+
+def bundled(spp="1024"):
+    """Our own scenes, rendered by both."""
+    import mitsuba as mi
+    mi.set_variant("llvm_ad_rgb")
+    print("| scene | mean ratio R G B | standard error | z rms | beyond 4 |\n|---|---|---|---|---|")
+    names = ["unit/" + n for n in sorted(os.listdir("scenes/unit")) if os.path.exists("scenes/unit/%s/scene.xml" % n)]
+    for name in ["cornell-box", "door-ajar", "glossy-metal", "glass-caustic"] + names:
+        path, size = "scenes/%s/scene.xml" % name, (64, 48)
+        _, layers, _ = fluxion(path, size, int(spp), "primal")
+        scene = mitsuba_scene(mi, path, size)
+        runs = np.stack([np.array(mi.render(scene, spp=int(spp) // 8, seed=10 + s), dtype=np.float64)[..., :3] for s in range(8)])
+        mean = rgb(layers) + rgb(layers, "direct.")
+        variance = rgb(layers, "variance.") + rgb(layers, "direct_variance.")
+        z_row(name, mean, variance, runs.mean(0), runs.var(0, ddof=1) / 8)
+
+
+if __name__ == "__main__":
+    if len(sys.argv) < 2 or sys.argv[1] not in ("radiance", "gradients", "correlation", "speed", "bundled"):
+        sys.exit(__doc__)
+    globals()[sys.argv[1]](*sys.argv[2:])
