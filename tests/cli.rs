@@ -158,15 +158,23 @@ fn a_missing_layer_is_named_with_the_flag_that_renders_it() {
 #[test]
 fn an_interrupt_ends_after_the_running_tiles_and_writes_what_is_there() {
     let folder = tempfile::tempdir().unwrap();
-    let mut child = std::process::Command::new(assert_cmd::cargo::cargo_bin("fluxion"))
+    /// Does not outlive the test, whatever happens.
+    struct Child(std::process::Child);
+    impl Drop for Child {
+        fn drop(&mut self) {
+            let _ = self.0.kill();
+        }
+    }
+    let child = std::process::Command::new(assert_cmd::cargo::cargo_bin("fluxion"))
         .current_dir(folder.path())
         .args(["render", &scene("cornell-box"), "-o", "a.exr", "--spp", "100000"])
         .stderr(std::process::Stdio::piped())
         .spawn()
         .unwrap();
+    let mut child = Child(child);
     std::thread::sleep(std::time::Duration::from_millis(1500));
-    std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
-    assert!(child.wait().unwrap().success());
+    std::process::Command::new("sh").args(["-c", &format!("kill -INT {}", child.0.id())]).status().unwrap();
+    assert!(child.0.wait().unwrap().success());
     let image = read_color(&folder.path().join("a.exr")).unwrap();
     assert!(image.data.iter().sum::<f32>() > 0.0);
 }

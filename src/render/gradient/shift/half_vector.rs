@@ -20,9 +20,20 @@ pub struct Copied {
     pub jacobian: f32,
 }
 
-/// How `offset` is left when the base path leaves `base` along `wo` by `lobe`. `None` when its material cannot do
-/// so.
-pub fn copy(scene: &Scene, base: &Surface, wo: Vec3, lobe: Lobe, offset: &Surface) -> Option<Copied> {
+/// The offset's direction and what it leads to.
+#[derive(Clone, Copy)]
+pub struct Extended {
+    /// The direction.
+    pub copied: Copied,
+    /// What the offset meets.
+    pub hit: Option<Surface>,
+    direction: Vec3,
+    delta: bool,
+}
+
+/// How `offset` is left when the base path leaves `base` along the direction and by the lobe given. `None` when its
+/// material cannot do so.
+fn copy(scene: &Scene, base: &Surface, (wo, lobe): (Vec3, Lobe), offset: &Surface) -> Option<Copied> {
     let bsdf = scene.bsdf(offset);
     if lobe.is_delta() {
         let delta = bsdf.delta(offset, offset.wi, lobe)?;
@@ -31,6 +42,14 @@ pub fn copy(scene: &Scene, base: &Surface, wo: Vec3, lobe: Lobe, offset: &Surfac
     let (wo, jacobian) = reflect(base.wi, wo, offset.wi)?;
     let eval = bsdf.eval(offset, offset.wi, wo);
     (eval.value != Rgb::ZERO && eval.pdf > 0.0).then_some(Copied { wo, value: eval.value, pdf: eval.pdf, jacobian })
+}
+
+/// Copies a direction and follows it to what the offset meets.
+pub fn extend(scene: &Scene, base: &Surface, left_by: (Vec3, Lobe), offset: &Surface) -> Option<Extended> {
+    let copied = copy(scene, base, left_by, offset)?;
+    let ray = offset.ray(copied.wo);
+    let (_, lobe) = left_by;
+    Some(Extended { copied, hit: scene.intersect(ray), direction: ray.direction, delta: lobe.is_delta() })
 }
 
 /// Mirrors `offset_wi` about the half vector of `wi` and `wo`, and the change of solid angle dω' / dω. `None` when
@@ -43,38 +62,19 @@ pub fn reflect(wi: Vec3, wo: Vec3, offset_wi: Vec3) -> Option<(Vec3, f32)> {
     (same_side && jacobian > 0.0 && jacobian.is_finite()).then_some((offset_wo, jacobian))
 }
 
-/// The offset's last segment when the base path reaches the emitter point `target` along `wo`: its own way has to
-/// meet an emitter too.
-pub fn to_light(
-    scene: &Scene,
-    base: &Surface,
-    wo: Vec3,
-    lobe: Lobe,
-    offset: &Surface,
-    target: &LightPoint,
-) -> Option<End> {
-    let copied = copy(scene, base, wo, lobe, offset)?;
-    let ray = offset.ray(copied.wo);
-    end(scene, &copied, lobe.is_delta(), offset, ray.direction, scene.intersect(ray).as_ref(), target)
-}
-
-/// The same for a direction that is copied already and `hit` what it meets.
-pub fn end(
-    scene: &Scene,
-    copied: &Copied,
-    delta: bool,
-    offset: &Surface,
-    direction: Vec3,
-    hit: Option<&Surface>,
-    target: &LightPoint,
-) -> Option<End> {
-    let far = matches!(target.position, Position::Infinity { .. });
-    let point = match hit {
-        Some(hit) if !far => scene.light_point(hit)?,
-        None if far => scene.environment(direction)?,
-        _ => return None,
-    };
-    let light_pdf = if delta { 0.0 } else { scene.emitter_pdf(offset.p, &point) };
-    let radiance = scene.radiance(&point, -direction);
-    Some(End { value: copied.value, pdf: copied.pdf, light_pdf, radiance, jacobian: copied.jacobian })
+impl Extended {
+    /// The offset's last segment when the base path's leads to the emitter point `target`: its own way has to lead
+    /// to an emitter too, and to infinity only with the base's.
+    pub fn end(&self, scene: &Scene, offset: &Surface, target: &LightPoint) -> Option<End> {
+        let far = matches!(target.position, Position::Infinity { .. });
+        let point = match &self.hit {
+            Some(hit) if !far => scene.light_point(hit)?,
+            None if far => scene.environment(self.direction)?,
+            _ => return None,
+        };
+        let light_pdf = if self.delta { 0.0 } else { scene.emitter_pdf(offset.p, &point) };
+        let radiance = scene.radiance(&point, -self.direction);
+        let Copied { value, pdf, jacobian, .. } = self.copied;
+        Some(End { value, pdf, light_pdf, radiance, jacobian })
+    }
 }

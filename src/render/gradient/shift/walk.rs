@@ -1,0 +1,286 @@
+//! Follows a base path vertex by vertex with an offset beside it, and sums up what they differ by.
+
+use super::half_vector::{self, Extended};
+use super::reconnect::{self, Connection};
+use super::{End, Rgb};
+use crate::math::Vec3;
+use crate::render::gradient::base_path::Vertex;
+use crate::render::path::{Emission, Light, Scatter};
+use crate::scene::bsdf::Lobe;
+use crate::scene::{Ray, Scene, Surface};
+
+/// What an offset path has gathered relative to its base path.
+#[derive(Clone, Copy, Debug)]
+struct Prefix {
+    /// J f(y) / p(x).
+    throughput: Rgb,
+    /// J p(y) / p(x).
+    ratio: f32,
+}
+
+impl Prefix {
+    /// Goes on by a segment with these factors; `None` when nothing is carried on.
+    fn extended(self, value: Rgb, ratio: f32) -> Option<Self> {
+        let next = Self { throughput: self.throughput * value, ratio: self.ratio * ratio };
+        (next.throughput != Rgb::ZERO && next.ratio > 0.0).then_some(next)
+    }
+}
+
+/// How an offset path stands to its base path at a vertex.
+#[derive(Clone, Copy, Debug)]
+enum State {
+    /// It has a vertex of its own.
+    Apart(Prefix, Surface),
+    /// It has just joined the base path's vertex, from the local direction given.
+    Joining(Prefix, Vec3),
+    /// It is the base path from the last vertex on.
+    Joined(Prefix),
+    /// It could not be continued.
+    Failed,
+}
+
+/// At a vertex the offset may stand differently for its light and for its continuation: a material that is smooth
+/// and diffuse at once is joined for the one and not for the other.
+#[derive(Clone, Copy)]
+struct States {
+    light: State,
+    scatter: State,
+}
+
+impl From<State> for States {
+    fn from(both: State) -> Self {
+        Self { light: both, scatter: both }
+    }
+}
+
+impl From<Option<State>> for States {
+    fn from(both: Option<State>) -> Self {
+        both.unwrap_or(State::Failed).into()
+    }
+}
+
+/// A segment of the base path: the vertex it leaves and how.
+#[derive(Clone, Copy)]
+struct Segment<'a> {
+    vertex: &'a Vertex,
+    scatter: &'a Scatter,
+}
+
+impl Segment<'_> {
+    /// f(x) of the emission at the segment's end, before division by the segment's density.
+    fn base(&self, emission: &Emission) -> Rgb {
+        let Scatter { bsdf, survival } = self.scatter;
+        self.vertex.throughput * bsdf.weight * emission.radiance * (bsdf.pdf / survival)
+    }
+
+    /// Density of the segment by both strategies.
+    fn density(&self, emission: &Emission) -> f32 {
+        self.scatter.bsdf.pdf + emission.light_pdf
+    }
+
+    /// The prefix behind the segment, which the offset scatters over with `value` and `pdf`, all Jacobians in.
+    fn extend(&self, prefix: Prefix, value: Rgb, pdf: f32) -> Option<Prefix> {
+        let Scatter { bsdf, survival } = self.scatter;
+        prefix.extended(value / (bsdf.pdf * survival), pdf / bsdf.pdf)
+    }
+}
+
+/// A contribution of the base path: f(x) before division by `density`, the sum of its strategies'.
+#[derive(Clone, Copy)]
+struct Contribution {
+    base: Rgb,
+    density: f32,
+    /// What is divided by besides densities, inverted.
+    scale: f32,
+}
+
+/// The sum of (J f(y) - f(x)) / D so far.
+pub struct Walk<'a> {
+    scene: &'a Scene,
+    threshold: f32,
+    difference: Rgb,
+}
+
+impl<'a> Walk<'a> {
+    /// Nothing yet. Smooth lobes of roughness above `threshold` count as diffuse.
+    pub fn new(scene: &'a Scene, threshold: f32) -> Self {
+        Self { scene, threshold, difference: Rgb::ZERO }
+    }
+
+    /// Walks along the vertices that light reaches, with an offset that starts with `ray`.
+    pub fn along(mut self, lit: &[Vertex], ray: Ray) -> Rgb {
+        let start = Prefix { throughput: Rgb::ONE, ratio: 1.0 };
+        let mut states = States::from(self.scene.intersect(ray).map(|surface| State::Apart(start, surface)));
+        for (k, vertex) in lit.iter().enumerate() {
+            if let Some(light) = &vertex.light {
+                self.add_light(vertex, light, states.light);
+            }
+            let next = lit.get(k + 1);
+            match &vertex.scatter {
+                Some(scatter) if next.is_some() || vertex.emission.is_some() => {
+                    states = self.advance(Segment { vertex, scatter }, states.scatter, next);
+                }
+                _ => break,
+            }
+        }
+        self.difference
+    }
+
+    fn is_diffuse(&self, roughness: Option<f32>) -> bool {
+        roughness.is_some_and(|roughness| roughness > self.threshold)
+    }
+
+    fn is_diffuse_at(&self, surface: &Surface) -> bool {
+        self.is_diffuse(self.scene.bsdf(surface).roughness(surface))
+    }
+
+    fn scatters_diffusely(&self, scatter: &Scatter, vertex: &Vertex) -> bool {
+        scatter.bsdf.lobe == Lobe::Smooth && self.is_diffuse(vertex.roughness)
+    }
+
+    /// A contribution of the base alone: the shift has failed.
+    fn add_base_only(&mut self, of: Contribution) {
+        self.difference -= of.base / of.density;
+    }
+
+    /// A contribution of both: J f(y) and J times the offset's density, both relative to the base's prefix.
+    fn add_pair(&mut self, of: Contribution, offset: Rgb, shifted: f32) {
+        if offset == Rgb::ZERO || shifted <= 0.0 {
+            return self.add_base_only(of);
+        }
+        self.difference += (offset * of.scale - of.base) / (of.density + shifted);
+    }
+
+    /// A contribution of which the offset has its last segment for itself, or none.
+    fn add_end(&mut self, of: Contribution, prefix: Prefix, end: Option<End>) {
+        match end {
+            Some(end) => {
+                let offset = prefix.throughput * end.value * end.radiance * end.jacobian;
+                self.add_pair(of, offset, prefix.ratio * end.jacobian * (end.light_pdf + end.pdf));
+            }
+            None => self.add_base_only(of),
+        }
+    }
+
+    /// The contribution of a vertex's chosen emitter point.
+    fn add_light(&mut self, vertex: &Vertex, light: &Light, state: State) {
+        let Light { point, radiance, wo, eval, pdf } = light;
+        let base = vertex.throughput * eval.value * *radiance;
+        let of = Contribution { base, density: pdf + eval.pdf, scale: 1.0 };
+        match state {
+            State::Failed => self.add_base_only(of),
+            State::Joined(prefix) => {
+                self.add_pair(of, prefix.throughput * eval.value * *radiance, prefix.ratio * of.density);
+            }
+            State::Joining(prefix, wi) => {
+                let moved = self.scene.bsdf(&vertex.surface).eval(&vertex.surface, wi, *wo);
+                self.add_pair(of, prefix.throughput * moved.value * *radiance, prefix.ratio * (pdf + moved.pdf));
+            }
+            State::Apart(prefix, surface) => {
+                let end = if self.is_diffuse(vertex.roughness) && self.is_diffuse_at(&surface) {
+                    reconnect::to_light(self.scene, &vertex.surface, &surface, point)
+                } else {
+                    half_vector::extend(self.scene, &vertex.surface, (*wo, Lobe::Smooth), &surface)
+                        .and_then(|extended| extended.end(self.scene, &surface, point))
+                };
+                self.add_end(of, prefix, end);
+            }
+        }
+    }
+
+    /// Follows the offset along a segment: adds the emitter at its end, and says how the offset stands at the
+    /// next vertex.
+    fn advance(&mut self, segment: Segment, state: State, next: Option<&Vertex>) -> States {
+        let Segment { vertex, scatter } = segment;
+        match state {
+            State::Failed => {
+                if let Some(emission) = &vertex.emission {
+                    self.add_base_only(contribution(segment, emission));
+                }
+                State::Failed.into()
+            }
+            State::Joined(prefix) => {
+                self.go_on(segment, prefix, scatter.bsdf.weight * scatter.bsdf.pdf, scatter.bsdf.pdf)
+            }
+            State::Joining(prefix, wi) => {
+                let moved = self.scene.bsdf(&vertex.surface).eval(&vertex.surface, wi, scatter.bsdf.wo);
+                self.go_on(segment, prefix, moved.value, moved.pdf)
+            }
+            State::Apart(prefix, surface) => {
+                if self.scatters_diffusely(scatter, vertex) && self.is_diffuse_at(&surface) {
+                    if let Some(emission) = &vertex.emission {
+                        let end = reconnect::to_light(self.scene, &vertex.surface, &surface, &emission.point);
+                        self.add_end(contribution(segment, emission), prefix, end);
+                    }
+                    return next.map_or(State::Failed.into(), |next| self.join(segment, prefix, &surface, next));
+                }
+                let extended = self.extend(segment, &surface);
+                if let Some(emission) = &vertex.emission {
+                    let end = extended.as_ref().and_then(|found| found.end(self.scene, &surface, &emission.point));
+                    self.add_end(contribution(segment, emission), prefix, end);
+                }
+                extended.and_then(|extended| self.apart(segment, prefix, &extended)).into()
+            }
+        }
+    }
+
+    /// Both paths leave the same vertex in the same direction; the offset scatters there with `value` and `pdf`.
+    fn go_on(&mut self, segment: Segment, prefix: Prefix, value: Rgb, pdf: f32) -> States {
+        if let Some(emission) = &segment.vertex.emission {
+            let offset = prefix.throughput * value * emission.radiance;
+            self.add_pair(contribution(segment, emission), offset, prefix.ratio * (pdf + emission.light_pdf));
+        }
+        segment.extend(prefix, value, pdf).map(State::Joined).into()
+    }
+
+    /// Over a segment between diffuse ends the base's next vertex is joined, unless it is glossy itself.
+    fn join(&self, segment: Segment, prefix: Prefix, surface: &Surface, next: &Vertex) -> States {
+        let light_joins = self.is_diffuse(next.roughness);
+        let scatter_joins = next.scatter.as_ref().is_some_and(|scatter| self.scatters_diffusely(scatter, next));
+        let mut states = States::from(State::Failed);
+        if scatter_joins || (light_joins && next.light.is_some()) {
+            let joined =
+                Connection::new(self.scene, &segment.vertex.surface, surface, &next.surface).and_then(|found| {
+                    let prefix = segment.extend(prefix, found.value * found.jacobian, found.pdf * found.jacobian)?;
+                    Some(State::Joining(prefix, found.wi))
+                });
+            states = joined.into();
+        }
+        let light_apart = next.light.is_some() && !light_joins;
+        let scatter_apart = next.scatter.as_ref().filter(|_| !scatter_joins);
+        if !light_apart && scatter_apart.is_none() {
+            return states;
+        }
+        let extended = self.extend(segment, surface);
+        // Where the offset's own new vertex is diffuse, the way back would have joined it: there is none.
+        let apart = |lobe: Lobe| {
+            let extended = extended.as_ref()?;
+            let joinable = lobe == Lobe::Smooth && extended.hit.as_ref().is_some_and(|hit| self.is_diffuse_at(hit));
+            if joinable { None } else { self.apart(segment, prefix, extended) }
+        };
+        if light_apart {
+            states.light = apart(Lobe::Smooth).unwrap_or(State::Failed);
+        }
+        if let Some(scatter) = scatter_apart {
+            states.scatter = apart(scatter.bsdf.lobe).unwrap_or(State::Failed);
+        }
+        states
+    }
+
+    /// Where the offset goes by itself over a segment.
+    fn extend(&self, segment: Segment, surface: &Surface) -> Option<Extended> {
+        let sampled = &segment.scatter.bsdf;
+        half_vector::extend(self.scene, &segment.vertex.surface, (sampled.wo, sampled.lobe), surface)
+    }
+
+    fn apart(&self, segment: Segment, prefix: Prefix, extended: &Extended) -> Option<State> {
+        let Extended { copied, hit, .. } = extended;
+        let prefix = segment.extend(prefix, copied.value * copied.jacobian, copied.pdf * copied.jacobian)?;
+        Some(State::Apart(prefix, (*hit)?))
+    }
+}
+
+fn contribution(segment: Segment, emission: &Emission) -> Contribution {
+    let (base, density) = (segment.base(emission), segment.density(emission));
+    Contribution { base, density, scale: 1.0 / segment.scatter.survival }
+}
