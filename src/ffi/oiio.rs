@@ -47,6 +47,8 @@ pub struct Pixels {
 
 /// More samples than this in one file are taken for a damaged or hostile header.
 const MAX_SAMPLES: usize = 1 << 32;
+/// So are more than this for every byte of the file: no compression packs real pictures like that.
+const MAX_SAMPLES_PER_BYTE: usize = 1 << 14;
 
 struct Open(*mut c_void);
 
@@ -75,7 +77,7 @@ unsafe fn owned(text: *const c_char) -> Option<String> {
 
 /// Reads a whole image, and those of `attributes` that its header has.
 pub fn read(path: &Path, attributes: &[&str]) -> Result<Pixels> {
-    std::fs::metadata(path).map_err(|error| Error::io(path, error))?;
+    let bytes = std::fs::metadata(path).map_err(|error| Error::io(path, error))?.len() as usize;
     let name = path_string(path)?;
     let mut spec = raw::FluxionImageSpec::default();
     let mut error = raw::FluxionError::default();
@@ -87,7 +89,7 @@ pub fn read(path: &Path, attributes: &[&str]) -> Result<Pixels> {
     let open = Open(handle);
     let [width, height, count] = [spec.width, spec.height, spec.channels].map(|n| usize::try_from(n).unwrap_or(0));
     let samples = width.checked_mul(height).and_then(|pixels| pixels.checked_mul(count)).unwrap_or(usize::MAX);
-    if samples == 0 || samples > MAX_SAMPLES {
+    if samples == 0 || samples > MAX_SAMPLES.min(bytes.saturating_mul(MAX_SAMPLES_PER_BYTE)) {
         return Err(Error::io(path, format!("the header claims {width}x{height} pixels of {count} channels")));
     }
     let channels = (0..spec.channels)

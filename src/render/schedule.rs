@@ -70,7 +70,12 @@ pub fn render(scene: &Scene, settings: Settings, control: &Control) -> Outcome {
         first_rejected: None,
     };
     while let Some(wave) = next_wave(settings.budget, outcome.spp, start.elapsed()) {
-        run_wave(scene, settings, control, &mut outcome, wave);
+        let done = outcome.spp;
+        let progress = |share: f32| match settings.budget {
+            Budget::Spp(spp) => (control.progress)((done as f32 + wave as f32 * share) / spp as f32),
+            Budget::Time(limit) => (control.progress)(start.elapsed().as_secs_f32() / limit.as_secs_f32()),
+        };
+        run_wave(scene, settings, &Control { stop: control.stop, progress: &progress }, &mut outcome, wave);
         outcome.spp += wave;
         outcome.stopped = control.stop.load(Ordering::Relaxed);
         if outcome.stopped {
@@ -96,9 +101,10 @@ fn next_wave(budget: Budget, done: u32, elapsed: Duration) -> Option<u32> {
     }
 }
 
+/// Adds `wave` samples to every pixel; `control.progress` is told the share of the wave.
 fn run_wave(scene: &Scene, settings: Settings, control: &Control, outcome: &mut Outcome, wave: u32) {
     let first_rejected = Mutex::new(outcome.first_rejected);
-    let (spp, tiles) = (outcome.spp, outcome.film.tiles_mut());
+    let tiles = outcome.film.tiles_mut();
     let (total, done) = (tiles.len(), Mutex::new(0));
     tiles.par_iter_mut().for_each(|tile| {
         if control.stop.load(Ordering::Relaxed) {
@@ -110,9 +116,7 @@ fn run_wave(scene: &Scene, settings: Settings, control: &Control, outcome: &mut 
         }
         let mut done = done.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
         *done += 1;
-        if let Budget::Spp(all) = settings.budget {
-            (control.progress)((spp as f32 + wave as f32 * *done as f32 / total as f32) / all as f32);
-        }
+        (control.progress)(*done as f32 / total as f32);
     });
     outcome.first_rejected = first_rejected.into_inner().unwrap_or_else(|poisoned| poisoned.into_inner());
 }

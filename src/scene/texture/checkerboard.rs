@@ -26,12 +26,23 @@ struct Checkerboard {
     to_uv: UvTransform,
 }
 
-impl Texture for Checkerboard {
-    fn color(&self, uv: Vec2) -> Rgb {
+impl Checkerboard {
+    /// Which square a point is in: 0 for the one at the origin, 1 for its neighbours.
+    fn square(&self, uv: Vec2) -> usize {
         let cell = self.to_uv.apply(uv);
         let half = (cell - cell.floor()).cmpgt(Vec2::splat(0.5));
-        let index = usize::from(half.test(0) != half.test(1));
-        self.colors[index].color(uv)
+        usize::from(half.test(0) != half.test(1))
+    }
+}
+
+impl Texture for Checkerboard {
+    fn color(&self, uv: Vec2) -> Rgb {
+        self.colors[self.square(uv)].color(uv)
+    }
+
+    /// Used as a number, the squares change places: so Mitsuba 3 has it, and the files of the field rely on it.
+    fn scalar(&self, uv: Vec2) -> f32 {
+        self.colors[1 - self.square(uv)].scalar(uv)
     }
 
     fn mean(&self) -> f32 {
