@@ -30,12 +30,19 @@ OIIO::TypeDesc type_of(const char *kind) {
 
 extern "C" void *fluxion_image_open(const char *path, FluxionImageSpec *spec, FluxionError *error) try {
   auto image = std::make_unique<OpenImage>();
-  image->input = OIIO::ImageInput::open(path);
+  // Colours as they are stored: by default they would be multiplied by alpha.
+  OIIO::ImageSpec config;
+  config.attribute("oiio:UnassociatedAlpha", 1);
+  image->input = OIIO::ImageInput::open(path, &config);
   if (!image->input) {
     fail(error, OIIO::geterror(), "the file is missing or of an unknown format");
     return nullptr;
   }
   const OIIO::ImageSpec &found = image->input->spec();
+  if (found.depth > 1 || found.deep) {
+    fail(error, "", "volumes and deep images are not supported");
+    return nullptr;
+  }
   spec->width = found.width;
   spec->height = found.height;
   spec->channels = found.nchannels;

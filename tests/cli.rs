@@ -133,6 +133,8 @@ fn mistakes_are_told_apart_and_leave_nothing_behind() {
         (vec!["render", &cornell, "-o", "a.exr", "--size", "999999x999999"], 1, "pixels"),
         (vec!["render", &cornell, "-o", "a.exr", "--spp", "0"], 2, "--spp"),
         (vec!["render", &cornell], 2, "--output"),
+        (vec!["render", &cornell, "-o", "b.exr", "--layers", "./b.exr"], 2, "written over"),
+        (vec!["validate", "--spp", "0"], 2, "--spp"),
         (vec!["render", &cornell, "--replay", "5000,1,1"], 2, "outside the film"),
         (vec!["reconstruct", "cut.exr", "-o", "a.exr"], 1, "cut.exr"),
         (vec!["compare", "cut.exr", "cut.exr"], 1, "cut.exr"),

@@ -56,10 +56,24 @@ fn mistakes_are_named_with_their_line() {
             "no known material",
         ),
         ("<shape type=\"sphere\"", "scene.xml:"),
+        ("<shape type=\"sphere\"><bsdf type=\"diffuse\"/><bsdf type=\"diffuse\"/></shape>", "a second bsdf"),
+        (
+            "<shape type=\"sphere\"><bsdf type=\"mask\"><texture name=\"opactiy\" type=\"checkerboard\"/><bsdf type=\"diffuse\"/></bsdf></shape>",
+            "has no use for the texture here",
+        ),
     ] {
         let text = message(&body.replace("CAMERA", &camera));
         assert!(text.contains(expected), "{body}: {text}");
     }
+}
+
+#[test]
+fn files_that_blow_up_are_refused() {
+    let nested = "<bsdf type=\"twosided\">".repeat(5000) + &"</bsdf>".repeat(5000);
+    assert!(message(&nested).contains("nested more than"));
+    let mut doubling = String::from("<default name=\"p0\" value=\"xxxxxxxx\"/>");
+    (0..40).for_each(|i| doubling += &format!("<default name=\"p{}\" value=\"$p{i}$p{i}\"/>", i + 1));
+    assert!(message(&doubling).contains("longer than"));
 }
 
 /// Mean colour of a small render with directly seen emitters.

@@ -40,7 +40,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let maps: Vec<_> = args.map.iter().cloned().collect();
     let to_stdout = args.json.as_ref().is_some_and(|path| path.as_os_str() == "-");
     let json_file = args.json.clone().filter(|_| !to_stdout);
-    let _claims = Claims::new(&maps, &[&json_file])?;
+    let _claims = Claims::new(&maps, &[&json_file], None)?;
     let mut object = serde_json::Map::new();
     for metric in METRICS {
         object.insert(metric.id.into(), metric.measure(&image, &reference)?.mean.into());

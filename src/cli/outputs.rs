@@ -3,17 +3,12 @@
 use std::fs::OpenOptions;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
+use fluxion::error::Error;
 use fluxion::image::io;
 
-/// Fails on a path that cannot be written, or on an image format that is not known.
-pub fn claim_image(path: &Path) -> Result<()> {
-    io::check_writable(path)?;
-    claim(path)
-}
-
 /// Fails on a path that cannot be written. A file that is there already keeps its content until it is replaced.
-pub fn claim(path: &Path) -> Result<()> {
+fn claim(path: &Path) -> Result<()> {
     let file = OpenOptions::new().create(true).append(true).open(path);
     file.map(drop).with_context(|| format!("cannot write {}", path.display()))
 }
@@ -22,19 +17,33 @@ pub fn claim(path: &Path) -> Result<()> {
 pub struct Claims(Vec<PathBuf>);
 
 impl Claims {
-    /// Claims images and other files.
-    pub fn new(images: &[PathBuf], others: &[&Option<PathBuf>]) -> Result<Self> {
+    /// Claims images and other files, all of them different from each other and from `input`.
+    pub fn new(images: &[PathBuf], others: &[&Option<PathBuf>], input: Option<&Path>) -> Result<Self> {
+        let others: Vec<_> = others.iter().filter_map(|path| path.as_ref()).collect();
+        let mut taken: Vec<_> = input.into_iter().map(identity).collect();
         let mut claims = Self(Vec::new());
         for path in images {
-            claim_image(path)?;
-            claims.0.push(path.clone());
+            io::check_writable(path)?;
         }
-        for path in others.iter().filter_map(|path| path.as_ref()) {
+        for path in images.iter().chain(others) {
+            let path_identity = identity(path);
+            if taken.contains(&path_identity) {
+                let what = format!("{} would be written over: give every file its own name", path.display());
+                bail!(Error::Usage(what));
+            }
+            taken.push(path_identity);
             claim(path)?;
             claims.0.push(path.clone());
         }
         Ok(claims)
     }
+}
+
+/// The same for two names of a file, whether it is there or not.
+fn identity(path: &Path) -> PathBuf {
+    let folder = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let folder = folder.canonicalize().unwrap_or_else(|_| folder.to_path_buf());
+    folder.join(path.file_name().unwrap_or_default())
 }
 
 impl Drop for Claims {

@@ -90,7 +90,7 @@ fn parse_sample(text: &str) -> Result<(usize, usize, u32), String> {
 pub fn run(args: &Args) -> Result<ExitCode> {
     super::use_threads(args.threads)?;
     let method = reconstruct::parse(&args.method)?;
-    let _claims = Claims::new(&args.output, &[&args.layers, &args.json])?;
+    let _claims = Claims::new(&args.output, &[&args.layers, &args.json], None)?;
     let mut stats = Stats { method: args.method.clone(), ..Stats::default() };
     let start = Instant::now();
     let options = load::Options { parameters: args.define.clone(), size: args.size, threads: args.threads };
@@ -164,7 +164,14 @@ fn warn(args: &Args, outcome: &Outcome) {
     if let Some((id, reason)) = outcome.first_rejected {
         let (count, SampleId { x, y, index, seed }) = (outcome.film.rejected(), id);
         eprintln!("warning: {count} samples were not finite ({}) and count as zero; the first one again:", reason.0);
-        eprintln!("  fluxion render {} --seed {seed} --replay {x},{y},{index}", args.scene.display());
+        let (width, height) = (outcome.film.width, outcome.film.height);
+        let definitions: String = args.define.iter().map(|(name, value)| format!(" -D '{name}={value}'")).collect();
+        let threshold = args.shift_threshold;
+        eprintln!(
+            "  fluxion render {} --size {width}x{height} --seed {seed} --shift-threshold {threshold}{definitions} \
+             --replay {x},{y},{index}",
+            args.scene.display()
+        );
     }
 }
 

@@ -13,7 +13,7 @@ pub struct Args {
     /// Folders with a scene.xml and a reference.exr [default: all below scenes/]
     scenes: Vec<PathBuf>,
     /// Samples per pixel to check with
-    #[arg(long, default_value_t = 256)]
+    #[arg(long, default_value_t = 256, value_parser = clap::value_parser!(u32).range(1..))]
     spp: u32,
     /// Seed to check with
     #[arg(long, default_value_t = 1)]
@@ -22,7 +22,7 @@ pub struct Args {
     #[arg(long, default_value_t = 0)]
     threads: usize,
     /// Make the references anew instead, with this many samples per pixel
-    #[arg(long, value_name = "SPP")]
+    #[arg(long, value_name = "SPP", value_parser = clap::value_parser!(u32).range(2..))]
     remake: Option<u32>,
     /// Film size of a reference that is made anew [default: the scene's own]
     #[arg(long, value_parser = super::parse_size, requires = "remake", value_name = "WxH")]

@@ -48,7 +48,7 @@ pub struct Pixels {
 /// More samples than this in one file are taken for a damaged or hostile header.
 const MAX_SAMPLES: usize = 1 << 32;
 /// So are more than this for every byte of the file: no compression packs real pictures like that.
-const MAX_SAMPLES_PER_BYTE: usize = 1 << 14;
+const MAX_SAMPLES_PER_BYTE: usize = 1 << 11;
 
 struct Open(*mut c_void);
 
@@ -168,6 +168,17 @@ mod tests {
                 assert_eq!(back.data[pixel * 4 + at].to_bits(), pixels.data[pixel * 4 + index].to_bits());
             }
         }
+    }
+
+    #[test]
+    fn alpha_does_not_darken_colours() {
+        let file = tempfile::Builder::new().suffix(".png").tempfile().unwrap();
+        let channels = ["R", "G", "B", "A"].map(String::from).to_vec();
+        let data = vec![1.0, 0.4, 0.2, 0.0];
+        let pixels = Pixels { width: 1, height: 1, channels, data, eight_bit: true, attributes: vec![] };
+        write(file.path(), &pixels, Kind::Uint8, None).unwrap();
+        let back = read(file.path(), &[]).unwrap();
+        back.data.iter().zip(&pixels.data).for_each(|(a, b)| assert!((a - b).abs() < 1e-3, "{a} {b}"));
     }
 
     #[test]

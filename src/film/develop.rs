@@ -107,6 +107,10 @@ impl Film {
         for y in 0..self.height - step.1 {
             for x in 0..self.width - step.0 {
                 let ((near, i), (far, j)) = (self.at(x, y), self.at(x + step.0, y + step.1));
+                // Half an edge is no estimate of it.
+                if near.counts[i] == 0 || far.counts[j] == 0 {
+                    continue;
+                }
                 let pixel = image.pixel_mut(x, y);
                 pixel
                     .iter_mut()

@@ -37,6 +37,7 @@ pub fn load(object: &Object, loader: &mut Loader, size: Option<(usize, usize)>, 
     let (mut film, mut spp) = ((768, 576), 64);
     for property in object.nested() {
         let nested = loader.resolve(property)?;
+        property.take();
         match nested.class.as_str() {
             "film" => film = film_size(&nested)?,
             "sampler" => {
@@ -116,6 +117,7 @@ fn film_size(object: &Object) -> Result<(usize, usize)> {
     ]);
     for property in object.nested() {
         if let super::load::props::Value::Object(filter) = &property.value {
+            property.take();
             if filter.class != "rfilter" {
                 return Err(filter.place.unsupported(format!("a {} in a film", filter.class)));
             }

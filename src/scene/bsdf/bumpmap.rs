@@ -6,7 +6,7 @@ use super::{Bsdf, BsdfSample, Delta, Eval, Lobe};
 use crate::error::Result;
 use crate::math::{Frame, Rgb, Vec2, Vec3, vec3};
 use crate::scene::Surface;
-use crate::scene::load::props::{Object, Value};
+use crate::scene::load::props::Object;
 use crate::scene::load::{Loader, Plugin};
 use crate::scene::texture::Texture;
 
@@ -23,12 +23,11 @@ fn make(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Bsdf>> {
     let shadowing = object.boolean("use_shadowing_function", true)?;
     let nested = loader.nested_bsdf(object)?;
     let mut height = None;
-    for property in &object.properties {
-        if matches!(property.value, Value::Object(_) | Value::Reference(_)) {
-            let child = loader.resolve(property)?;
-            if child.class == "texture" {
-                height = Some(loader.texture_object(&child)?);
-            }
+    for property in object.nested() {
+        let child = loader.resolve(property)?;
+        if child.class == "texture" {
+            property.take();
+            height = Some(loader.texture_object(&child)?);
         }
     }
     let height = height.ok_or_else(|| object.place.invalid("`bumpmap` needs a nested texture"))?;

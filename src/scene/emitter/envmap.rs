@@ -50,8 +50,8 @@ impl EnvMap {
             let (above, below) = (y.saturating_sub(1), (y + 1).min(height - 1));
             for x in 0..width {
                 // A cell is lit through interpolation by its neighbours too.
-                let cross = value(x, above) + value(x, below) + value(x + width - 1, y) + value(x + 1, y);
-                weights[y * width + x] = (0.5 * value(x, y) + 0.125 * cross) * sine;
+                let row = |y| value(x + width - 1, y) + 2.0 * value(x, y) + value(x + 1, y);
+                weights[y * width + x] = (row(above) + 2.0 * row(y) + row(below)) * (sine / 16.0);
             }
         }
         let sines: f32 = (0..height).map(|y| (PI * (y as f32 + 0.5) / height as f32).sin()).sum();

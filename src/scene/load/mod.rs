@@ -160,7 +160,9 @@ impl Loader {
         let mut emitter = None;
         for property in object.nested() {
             let nested = self.resolve(property)?;
+            property.take();
             match nested.class.as_str() {
+                "bsdf" if bsdf.is_some() => return Err(nested.place.invalid("a second bsdf; a shape has one")),
                 "bsdf" => bsdf = Some(self.bsdf(&nested)?),
                 "emitter" if nested.plugin == "area" => {
                     let radiance = self.radiance(&nested, "radiance")?;
@@ -228,6 +230,7 @@ impl Loader {
         for property in object.nested() {
             let nested = self.resolve(property)?;
             if nested.class == "bsdf" {
+                property.take();
                 found.push(self.bsdf(&nested)?);
             }
         }

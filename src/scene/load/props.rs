@@ -49,6 +49,11 @@ impl Property {
         Self { name, value, place, used: Cell::new(false) }
     }
 
+    /// Marks a nested object as used.
+    pub fn take(&self) {
+        self.used.set(true);
+    }
+
     fn mistyped(&self, expected: &str) -> Error {
         self.place.invalid(format!("`{}` must be {expected}", self.name))
     }
@@ -164,10 +169,9 @@ impl Object {
         self.properties.iter().find(|property| property.name == name).map_or(&self.place, |p| &p.place).clone()
     }
 
-    /// Nested objects and references, marked as used.
+    /// Nested objects and references. Whoever takes one marks it with [`Property::take`].
     pub fn nested(&self) -> impl Iterator<Item = &Property> {
-        let nested = |property: &&Property| matches!(property.value, Value::Object(_) | Value::Reference(_));
-        self.properties.iter().filter(nested).inspect(|property| property.used.set(true))
+        self.properties.iter().filter(|property| matches!(property.value, Value::Object(_) | Value::Reference(_)))
     }
 
     /// Marks properties that are known and have no meaning here.

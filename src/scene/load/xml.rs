@@ -14,6 +14,12 @@ use crate::math::{Rgb, Vec3, vec3};
 
 /// Includes nested deeper than this are taken for a loop.
 const MAX_INCLUDES: usize = 15;
+/// More files than this in one scene are taken for a mistake.
+const MAX_FILES: usize = 1000;
+/// Elements nested deeper than this are taken for a mistake.
+const MAX_DEPTH: usize = 64;
+/// Parameters longer than this are taken for a mistake.
+const MAX_PARAMETER: usize = 1 << 16;
 
 /// A parsed scene file with everything it includes.
 pub struct Tree {
@@ -32,7 +38,7 @@ pub fn parse(path: &Path, parameters: &[(String, String)]) -> Result<Tree> {
     let folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
     let tree = Tree { objects: Vec::new(), ids: HashMap::new(), folders: vec![folder], sources: Vec::new() };
     let defaults = parameters.iter().cloned().collect();
-    let mut parser = Parser { tree, defaults, aliases: Vec::new(), includes: Vec::new() };
+    let mut parser = Parser { tree, defaults, aliases: Vec::new(), includes: Vec::new(), depth: 0 };
     parser.file(path)?;
     for (id, alias, place) in std::mem::take(&mut parser.aliases) {
         let object = parser.tree.ids.get(&id).cloned();
@@ -47,6 +53,7 @@ struct Parser {
     defaults: HashMap<String, String>,
     aliases: Vec<(String, String, Place)>,
     includes: Vec<PathBuf>,
+    depth: usize,
 }
 
 /// A node with what is needed to speak of its place.
@@ -103,6 +110,9 @@ impl Parser {
                 if self.includes.len() >= MAX_INCLUDES || self.includes.contains(&path) || path == at.file {
                     return Err(at.place().invalid(format!("`{name}` includes itself")));
                 }
+                if self.tree.sources.len() >= MAX_FILES {
+                    return Err(at.place().invalid(format!("more than {MAX_FILES} files in one scene")));
+                }
                 self.includes.push(path.clone());
                 self.file(&path)?;
                 self.includes.pop();
@@ -158,6 +168,9 @@ impl Parser {
             rest = &after[end..];
         }
         result.push_str(rest);
+        if result.len() > MAX_PARAMETER {
+            return Err(at.place().invalid(format!("`{name}` is longer than {MAX_PARAMETER} bytes")));
+        }
         Ok(Some(result))
     }
 
@@ -201,9 +214,14 @@ impl Parser {
     fn object(&mut self, at: At) -> Result<Rc<Object>> {
         let plugin = self.attribute(at, "type")?;
         let mut properties = Vec::new();
+        if self.depth >= MAX_DEPTH {
+            return Err(at.place().invalid(format!("elements nested more than {MAX_DEPTH} deep")));
+        }
+        self.depth += 1;
         for child in at.children() {
             properties.push(self.property(child)?);
         }
+        self.depth -= 1;
         let id = self.optional(at, "id")?;
         let object = Rc::new(Object { class: at.tag().to_owned(), plugin, place: at.place(), properties });
         if let Some(id) = id {
