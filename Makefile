@@ -4,7 +4,7 @@
 PACKAGES = g++ pkg-config libclang-dev libembree-dev libopenimageio-dev
 SCENE = scenes/cornell-box/scene.xml
 
-.PHONY: demo test packages check validate
+.PHONY: demo test packages check
 
 demo: packages
 	cargo build --release

@@ -1,6 +1,6 @@
 //! Film to frame: sums become means, and the two ends of every edge are joined.
 
-use super::sample::{Moments, bin_count};
+use super::sample::Moments;
 use super::{BINS, Film, Frame, Layer, Tile};
 use crate::image::Image;
 
@@ -76,7 +76,6 @@ impl Film {
                 layer,
                 self.edge_image(step, |tile, i, near, c| {
                     let end = if near { here } else { there } / 3;
-                    debug_assert!(bin_count(tile.counts[i], k) <= tile.counts[i]);
                     tile.bins[i][k].edges[end][c] * if near { 1.0 } else { -1.0 }
                 }),
             );

@@ -44,20 +44,21 @@ pub fn write_color(path: &Path, image: &Image, attributes: &[(String, String)]) 
     write(path, &pixels, if encoded { Kind::Uint8 } else { Kind::Float }, exr.then_some("zips"))
 }
 
+/// Positions of the R, G and B channels. Without them, a file of up to `grey` channels has its first one thrice.
+pub fn rgb_channels(path: &Path, pixels: &Pixels, grey: usize) -> Result<[usize; 3]> {
+    let find = |name: &str| pixels.channels.iter().position(|other| other.eq_ignore_ascii_case(name));
+    match (find("R"), find("G"), find("B")) {
+        (Some(r), Some(g), Some(b)) => Ok([r, g, b]),
+        _ if pixels.channels.len() <= grey => Ok([0; 3]),
+        _ => Err(Error::io(path, format!("no channels R, G, B among {}", pixels.channels.join(", ")))),
+    }
+}
+
 /// Reads the R, G and B channels of a linear image (or its single channel, as grey). Eight-bit files are
 /// decoded from sRGB.
 pub fn read_color(path: &Path) -> Result<Image> {
     let pixels = read(path, &[])?;
-    let wanted = match pixels.channels.as_slice() {
-        [_] => [0; 3],
-        names => {
-            let find = |name: &str| names.iter().position(|other| other.eq_ignore_ascii_case(name));
-            match (find("R"), find("G"), find("B")) {
-                (Some(r), Some(g), Some(b)) => [r, g, b],
-                _ => return Err(Error::io(path, format!("no channels R, G, B among {}", names.join(", ")))),
-            }
-        }
-    };
+    let wanted = rgb_channels(path, &pixels, 1)?;
     let decode = |value: f32| if pixels.eight_bit { crate::math::srgb_decode(value) } else { value };
     let count = pixels.channels.len();
     let data = pixels.data.chunks_exact(count).flat_map(|pixel| wanted.map(|c| decode(pixel[c]))).collect();

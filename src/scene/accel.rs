@@ -1,7 +1,5 @@
 //! The scene's surfaces in Embree.
 
-use std::sync::Arc;
-
 use super::shape::{Bounds, Geometry};
 use super::{Instance, Ray};
 use crate::error::Result;
@@ -28,9 +26,7 @@ impl Accel {
         for instance in instances {
             bounds = bounds.union(instance.geometry.bounds());
             match &*instance.geometry {
-                Geometry::Mesh(mesh) => {
-                    builder.add_triangles(&Arc::clone(&mesh.positions), &Arc::clone(&mesh.triangles))?
-                }
+                Geometry::Mesh(mesh) => builder.add_triangles(&mesh.positions, &mesh.triangles)?,
                 Geometry::Sphere(sphere) => {
                     builder.add_spheres(vec![sphere.center.extend(sphere.radius).to_array()])?
                 }

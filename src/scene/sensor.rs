@@ -1,7 +1,7 @@
 //! The perspective camera and its film size.
 
 use crate::error::Result;
-use crate::math::{Mat4, Vec2, Vec3, vec2, vec3};
+use crate::math::{Mat4, Vec2, Vec3, vec2};
 use crate::scene::Ray;
 use crate::scene::load::Loader;
 use crate::scene::load::props::Object;
@@ -131,8 +131,7 @@ impl Sensor {
     /// The ray through a film position in pixels: (0, 0) is the upper left corner of the image.
     pub fn ray(&self, film: Vec2) -> Ray {
         let at = film / vec2(self.width as f32, self.height as f32) + self.principal_point;
-        let local = ((Vec2::ONE - 2.0 * at) * self.half_extent).extend(1.0);
-        let local = vec3(local.x, local.y, 1.0).normalize();
+        let local = ((Vec2::ONE - 2.0 * at) * self.half_extent).extend(1.0).normalize();
         let direction = self.to_world.transform_vector3(local).normalize();
         Ray { origin: self.origin + direction * (self.near / local.z), direction }
     }

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::{Arc, OnceLock};
 
 use super::{Texture, UvTransform};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::image::io;
 use crate::math::{Rgb, Vec2, luminance, srgb_decode, vec2, vec3};
 use crate::scene::load::props::Object;
@@ -48,12 +48,7 @@ impl Texels {
     /// Reads an image file; grey is spread over the three channels.
     pub fn read(path: &Path) -> Result<Self> {
         let pixels = io::read(path, &[])?;
-        let position = |name: &str| pixels.channels.iter().position(|other| other.eq_ignore_ascii_case(name));
-        let order = match (position("R"), position("G"), position("B")) {
-            (Some(r), Some(g), Some(b)) => [r, g, b],
-            _ if pixels.channels.len() <= 2 => [0; 3],
-            _ => return Err(Error::io(path, format!("no channels R, G, B among {}", pixels.channels.join(", ")))),
-        };
+        let order = io::rgb_channels(path, &pixels, 2)?;
         let texels = pixels.data.chunks_exact(pixels.channels.len()).map(|pixel| order.map(|channel| pixel[channel]));
         let samples = if pixels.eight_bit {
             Samples::Byte(texels.map(|texel| texel.map(|value| (value * 255.0).round() as u8)).collect())
