@@ -9,7 +9,7 @@ use std::process::exit;
 const PACKAGES: &str = "sudo apt-get install g++ pkg-config libclang-dev libembree-dev libopenimageio-dev";
 
 fn main() {
-    for file in ["ffi/embree.h", "ffi/embree.c", "ffi/oiio.h", "ffi/oiio.cpp"] {
+    for file in ["ffi/embree.h", "ffi/embree.cpp", "ffi/oiio.h", "ffi/oiio.cpp"] {
         println!("cargo::rerun-if-changed={file}");
     }
     for variable in ["EMBREE_DIR", "EMBREE_INCLUDE_DIR", "EMBREE_LIB_DIR"] {
@@ -39,7 +39,8 @@ fn build_embree() {
         fail(&format!("Embree {major}.{minor} was found; Fluxion needs 3.13 or later"));
     }
     let mut build = cc::Build::new();
-    build.file("ffi/embree.c").define("FLUXION_EMBREE_MAJOR", major.to_string().as_str()).std("c11");
+    build.cpp(true).std("c++17").file("ffi/embree.cpp");
+    build.define("FLUXION_EMBREE_MAJOR", major.to_string().as_str());
     if let Some(include) = &include {
         build.include(include);
     }
@@ -99,8 +100,9 @@ fn build_openimageio() {
 fn bind(header: &str, output: &str) {
     let bindings = bindgen::Builder::default()
         .header(header)
-        .allowlist_item("(fluxion|Fluxion).*")
+        .allowlist_item("(fluxion|Fluxion|FLUXION).*")
         .derive_default(true)
+        .default_enum_style(bindgen::EnumVariation::Rust { non_exhaustive: false })
         .layout_tests(true)
         .generate();
     let bindings = match bindings {

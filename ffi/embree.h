@@ -20,16 +20,33 @@ typedef struct FluxionRay {
   float t_far;
 } FluxionRay;
 
-/* Barycentric u and v weigh the second and the third vertex; for spheres they are unused.
+/* Barycentric u and v weigh the second and the third vertex; for other shapes they are unused.
+ * `instance` is the identifier of the instance that was entered, or FLUXION_NO_INSTANCE.
  * `normal` is not normalised. */
+#define FLUXION_NO_INSTANCE 0xffffffffu
+
 typedef struct FluxionHit {
   float t;
   float u;
   float v;
   uint32_t geometry;
   uint32_t primitive;
+  uint32_t instance;
   float normal[3];
 } FluxionHit;
+
+typedef enum FluxionQuadricKind {
+  FLUXION_DISK,    /* x² + y² <= 1 in the plane z = 0 */
+  FLUXION_CYLINDER /* x² + y² = 1 for z in [0, 1], open at both ends */
+} FluxionQuadricKind;
+
+/* `to_object` holds the columns x, y, z and translation; the box is the world's. */
+typedef struct FluxionQuadric {
+  FluxionQuadricKind kind;
+  float to_object[12];
+  float lower[3];
+  float upper[3];
+} FluxionQuadric;
 
 typedef void (*FluxionErrorFunction)(void *user, int code, const char *message);
 
@@ -44,6 +61,10 @@ uint32_t fluxion_scene_add_triangles(void *device, void *scene, const float *ver
                                      const uint32_t *indices, size_t triangle_count);
 /* `spheres` holds count * 4 floats: centre and radius. */
 uint32_t fluxion_scene_add_spheres(void *device, void *scene, const float *spheres, size_t count);
+/* The quadric must outlive the scene. */
+uint32_t fluxion_scene_add_quadric(void *device, void *scene, const FluxionQuadric *quadric);
+/* Another, committed scene of the same device, placed by 16 floats column by column. */
+uint32_t fluxion_scene_add_instance(void *device, void *scene, void *child, const float to_world[16]);
 void fluxion_scene_commit(void *scene);
 void fluxion_scene_bounds(void *scene, float lower[3], float upper[3]);
 void fluxion_scene_release(void *scene);

@@ -26,6 +26,8 @@ const FFI_USERS: &[&str] = &[
     "src/scene/shape/mod.rs",
     "src/scene/shape/mesh.rs",
     "src/scene/shape/sphere.rs",
+    "src/scene/shape/disk.rs",
+    "src/scene/shape/cylinder.rs",
 ];
 
 fn files(folder: &Path, found: &mut Vec<PathBuf>) {

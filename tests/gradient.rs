@@ -6,7 +6,7 @@ mod common;
 use common::{ALL, bundled, film};
 use fluxion::film::{Layer, Needs};
 use fluxion::image::Image;
-use fluxion::math::{Vec3, rng, vec3};
+use fluxion::math::{Vec3, rng, vec2, vec3};
 use fluxion::render::gradient::shift::{half_vector, reconnect};
 
 /// Independent pairs of a gradient render and a path-traced one.
@@ -157,7 +157,7 @@ fn half_vector_copies_can_be_undone_and_their_jacobian_is_the_change_of_solid_an
 #[test]
 fn reconnection_jacobians_invert_each_other_and_are_the_change_of_solid_angle() {
     let scene = bundled("unit/diffuse", (8, 6));
-    let target = scene.intersect(scene.sensor().ray(fluxion::math::vec2(4.0, 5.0))).unwrap();
+    let target = scene.intersect(scene.sensor().ray(vec2(4.0, 5.0), vec2(0.5, 0.5))).unwrap();
     for i in 0..100 {
         let (base, offset) = (
             target.p + target.frame.to_world(direction(i)) * 1.5,

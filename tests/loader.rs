@@ -4,7 +4,9 @@ mod common;
 
 use common::{film, scene, sensor, try_scene};
 use fluxion::film::{Layer, Needs};
-use fluxion::scene::load;
+use fluxion::math::{vec2, vec3};
+use fluxion::scene::emitter::Position;
+use fluxion::scene::{Ray, load};
 use proptest::prelude::*;
 
 fn message(body: &str) -> String {
@@ -44,9 +46,29 @@ fn mistakes_are_named_with_their_line() {
             "unknown transform <skew>",
         ),
         ("<medium type=\"homogeneous\"/>", "<medium> in a scene"),
-        ("<integrator type=\"bdpt\"/>", "so use `path`"),
+        ("<integrator type=\"bdpt\"/>", "there are path, volpath"),
         ("<emitter type=\"constant\"/><emitter type=\"constant\"/>CAMERA", "more than one environment"),
-        ("CAMERACAMERA", "a second sensor"),
+        ("<sensor type=\"thinlens\"/>", "needs an `aperture_radius`"),
+        (
+            "<sensor type=\"perspective\"><film type=\"hdrfilm\"><integer name=\"width\" value=\"8\"/><integer name=\"crop_offset_x\" value=\"6\"/><integer name=\"crop_width\" value=\"3\"/></film></sensor>",
+            "a crop window of 3x576 at 6,0",
+        ),
+        ("CAMERA<emitter type=\"spot\"><float name=\"cutoff_angle\" value=\"100\"/></emitter>", "a cone of 100"),
+        ("<emitter type=\"sunsky\"/>", "`sunsky` is not known; there are envmap"),
+        ("<shape type=\"instance\"/>", "needs exactly one shapegroup"),
+        (
+            "<shape type=\"instance\"><shape type=\"shapegroup\"><shape type=\"sphere\"><emitter type=\"area\"/></shape></shape></shape>",
+            "an emitter in a shapegroup",
+        ),
+        ("<shape type=\"merge\" id=\"m\"><ref id=\"m\"/></shape>", "nested too deeply"),
+        (
+            "<shape type=\"sphere\"><bsdf type=\"diffuse\"><spectrum name=\"reflectance\" value=\"500:1, 400:1\"/></bsdf></shape>",
+            "must rise",
+        ),
+        (
+            "CAMERA<shape type=\"sphere\"><bsdf type=\"diffuse\"><texture name=\"reflectance\" type=\"mesh_attribute\"><string name=\"name\" value=\"face_tone\"/></texture></bsdf></shape>",
+            "no mesh has the attribute `face_tone`",
+        ),
         (
             "<shape type=\"sphere\"><bsdf type=\"twosided\"><bsdf type=\"dielectric\"/></bsdf></shape>",
             "transmits light",
@@ -174,5 +196,93 @@ proptest! {
         let path = folder.path().join("scene.xml");
         std::fs::write(&path, bytes).unwrap();
         let _ = load::load(&path, &load::Options::default());
+    }
+}
+
+#[test]
+fn files_of_older_versions_say_the_same() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("old.xml");
+    let text = r##"<scene version="0.6.0">
+        <integrator type="path"><integer name="maxDepth" value="3"/><boolean name="strictNormals" value="true"/></integrator>
+        <sensor type="perspective"><string name="fovAxis" value="smaller"/><float name="fov" value="40"/>
+            <transform name="toWorld"><lookAt origin="0,0,4" target="0,0,0" up="0,1,0"/></transform>
+            <film type="ldrfilm"><integer name="width" value="6"/><integer name="height" value="4"/></film></sensor>
+        <shape type="rectangle"><bsdf type="diffuse"><srgb name="reflectance" value="#808080"/></bsdf></shape>
+        <shape type="sphere"><bsdf type="roughplastic"><float name="intIOR" value="1.5"/>
+            <texture name="diffuseReflectance" type="checkerboard"><float name="uscale" value="4"/></texture></bsdf></shape>
+    </scene>"##;
+    std::fs::write(&path, text).unwrap();
+    let scene = load::load(&path, &load::Options::default()).unwrap();
+    assert_eq!((scene.integrator().max_depth, scene.shapes().len()), (3, 2));
+    let hit = scene.intersect(scene.sensor().ray(vec2(1.8, 0.7), vec2(0.5, 0.5))).unwrap();
+    assert!((scene.bsdf(&hit).albedo(&hit).x - 0.2158605).abs() < 1e-4);
+}
+
+/// The same group once as instances and once as shapes of their own.
+#[test]
+fn instances_are_what_their_shapes_would_be() {
+    let shapes = |transform: &str| {
+        let mut text = String::new();
+        for (plugin, own) in [
+            ("sphere", "<scale value=\"0.6\"/>"),
+            ("cube", "<translate x=\"1.5\"/>"),
+            ("disk", "<translate y=\"1.4\"/>"),
+            ("cylinder", "<translate y=\"-2\"/>"),
+        ] {
+            text +=
+                &format!("<shape type=\"{plugin}\"><transform name=\"to_world\">{own}{transform}</transform></shape>");
+        }
+        text
+    };
+    let placement = "<scale value=\"0.7\"/><rotate x=\"1\" y=\"1\" angle=\"35\"/><translate x=\"-0.4\"/>";
+    let camera = common::sensor("0,0,6", 24, 24);
+    let plain = common::scene(&format!("{camera}{}", shapes(placement)));
+    let group = format!("<shape type=\"shapegroup\" id=\"g\">{}</shape>", shapes(""));
+    let instance =
+        format!("<shape type=\"instance\"><ref id=\"g\"/><transform name=\"to_world\">{placement}</transform></shape>");
+    let instanced = common::scene(&format!("{camera}{group}{instance}"));
+    let (a, b) = (plain.bounds(), instanced.bounds());
+    assert!(a.lower.cmpge(b.lower - 1e-4).all() && a.upper.cmple(b.upper + 1e-4).all());
+    let mut hits = 0;
+    for pixel in 0..24 * 24 {
+        let ray = plain.sensor().ray(vec2((pixel % 24) as f32 + 0.3, (pixel / 24) as f32 + 0.6), vec2(0.5, 0.5));
+        let (Some(a), Some(b)) = (plain.intersect(ray), instanced.intersect(ray)) else {
+            assert!(plain.intersect(ray).is_none() && instanced.intersect(ray).is_none(), "pixel {pixel}");
+            continue;
+        };
+        hits += 1;
+        assert_eq!(a.at.shape, b.at.shape, "pixel {pixel}");
+        assert!(a.p.distance(b.p) < 1e-4 && a.n.distance(b.n) < 1e-3 && a.frame.n.distance(b.frame.n) < 1e-3);
+        assert!(a.at.uv.distance(b.at.uv) < 1e-3 && a.wi.z - b.wi.z < 1e-3, "pixel {pixel}: {a:?} {b:?}");
+    }
+    assert!(hits > 100, "{hits}");
+}
+
+/// Points drawn on a shape lie where rays meet it, with its normal and texture coordinates there.
+#[test]
+fn points_drawn_on_shapes_are_on_them() {
+    let place =
+        "<transform name=\"to_world\"><scale value=\"1.3\"/><rotate y=\"1\" z=\"0.5\" angle=\"50\"/></transform>";
+    for (plugin, extra) in
+        [("disk", ""), ("cylinder", "<boolean name=\"flip_normals\" value=\"true\"/>"), ("rectangle", "")]
+    {
+        let scene = common::scene(&format!(
+            "{}<shape type=\"{plugin}\">{place}{extra}<emitter type=\"area\"/></shape>",
+            common::sensor("0,0,6", 4, 4)
+        ));
+        let geometry = &scene.shapes()[0].geometry;
+        for i in 0..64 {
+            let u = vec2((i % 8) as f32 + 0.5, (i / 8) as f32 + 0.5) / 8.0;
+            let from = vec3(0.3, -0.2, 5.0);
+            let point = geometry.sample(from, u).unwrap();
+            let Position::Surface { p, n } = point.position else { panic!("{plugin} has no surface") };
+            let hit = scene.intersect(Ray::new(p + n * 0.1, -n)).unwrap();
+            assert!(hit.p.distance(p) < 1e-4 && hit.n.distance(n) < 1e-4, "{plugin}: {hit:?} {point:?}");
+            assert!(hit.at.uv.distance(point.at.uv) < 1e-3, "{plugin}: {} {}", hit.at.uv, point.at.uv);
+            let seen = point.solid_angle(from);
+            let density = geometry.pdf(from, &point) * seen * geometry.area();
+            assert!(seen == 0.0 || (density - 1.0).abs() < 1e-3, "{plugin}: {density}");
+        }
     }
 }

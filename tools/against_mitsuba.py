@@ -1,6 +1,6 @@
 """Fluxion beside Mitsuba 3: radiance, gradients, correlation and speed, as the tables of docs/results.md.
 
-    python tools/against_mitsuba.py radiance SCENES REFERENCES [SPP=512]
+    python tools/against_mitsuba.py radiance SCENES REFERENCES [SPP=512] [NAME]
     python tools/against_mitsuba.py gradients [SPP=128]
     python tools/against_mitsuba.py correlation SCENES REFERENCES [SPP=64]
     python tools/against_mitsuba.py speed SCENES [SPP=8]
@@ -51,25 +51,53 @@ def fluxion(scene, size, spp, method, seed=1, extra=()):
             return rgb(read(at("o.exr"))), read(at("l.exr")), json.load(file)
 
 
-def z_row(name, mean, variance, reference, reference_variance):
+def z_row(name, mean, variance, reference, reference_variance, rest=""):
     """Mean ratio with its standard error, and what the differences are in standard errors."""
     total = variance + reference_variance
     z = np.where(np.abs(mean - reference) <= 1e-5 * reference, 0.0, (mean - reference) / np.sqrt(total + 1e-12))
     ratio = mean.sum((0, 1)) / reference.sum((0, 1))
     error = np.sqrt(total.sum((0, 1))) / reference.sum((0, 1))
-    print("| %s | %s | %s | %.3f | %.2f %% |" % (
+    print("| %s | %s | %s | %.3f | %.2f %% |%s" % (
         name, " ".join("%.4f" % r for r in ratio), " ".join("%.4f" % e for e in error), np.sqrt((z * z).mean()),
-        100 * (np.abs(z) > 4).mean()), flush=True)
+        100 * (np.abs(z) > 4).mean(), rest), flush=True)
 
 
-def radiance(scenes, references, spp="512"):
-    print("| scene | mean ratio R G B | standard error | z rms | beyond 4 |\n|---|---|---|---|---|")
-    for name, size in SIZES.items():
-        _, layers, _ = fluxion(os.path.join(scenes, name, "scene.xml"), size, int(spp), "primal")
-        mean = rgb(layers) + rgb(layers, "direct.")
-        variance = rgb(layers, "variance.") + rgb(layers, "direct_variance.")
+def public_scenes(scenes, references):
+    """Name, scene file, mean, variance of the mean, and whether the variance is that of one sample."""
+    for name in sorted(n[:-8] for n in os.listdir(references) if n.endswith("_var.exr")):
         reference = os.path.join(references, name)
-        z_row(name, mean, variance, rgb(read(reference + ".exr")), rgb(read(reference + "_var.exr")))
+        yield name, os.path.join(scenes, name, "scene.xml"), reference + ".exr", reference + "_var.exr", False
+    for folder, _, files in sorted(os.walk(os.path.join(scenes, "mitsuba-tests"))):
+        for file in sorted(f for f in files if f.endswith("_ref_rgb.exr")):
+            stem = file[:-len("_ref_rgb.exr")]
+            for scene in (f for f in os.listdir(os.path.dirname(folder)) if f.startswith(stem + "_") and f.endswith(".xml")):
+                if scene[len(stem) + 1:-4] in ("path", "direct"):
+                    path = os.path.join(folder, file)
+                    yield stem, os.path.join(os.path.dirname(folder), scene), path, path[:-4] + "_var.exr", True
+
+
+def radiance(scenes, references, spp="512", only=""):
+    """Every scene against its reference. Variances of a single sample are divided by our samples; those of test
+    references were taken with many more samples than we have, so that they count as exact."""
+    print("| scene | mean ratio R G B | standard error | z rms | beyond 4 | load s | render s | MB |")
+    print("|---|---|---|---|---|---|---|---|")
+    for name, scene, reference, variance, of_sample in public_scenes(scenes, references):
+        if only not in name:
+            continue
+        expected, theirs = rgb(read(reference)), rgb(read(variance))
+        samples = 4 * int(spp) if of_sample else int(spp)
+        try:
+            _, layers, stats = fluxion(scene, expected.shape[1::-1], samples, "primal")
+        except subprocess.CalledProcessError:
+            print("| %s | failed |" % name, flush=True)
+            continue
+        mean = rgb(layers) + rgb(layers, "direct.")
+        ours = rgb(layers, "variance.") + rgb(layers, "direct_variance.")
+        if of_sample:
+            # Pixels that all of one program's samples missed have no variance there; the floor is for rounding.
+            ours, theirs = np.maximum(np.maximum(ours, theirs / samples), 1e-4 / samples), 0
+        z_row(name, mean, ours, expected, theirs, " %.2f | %.1f | %.0f |" % (
+            stats["seconds"]["load"], stats["seconds"]["render"], stats["peak_bytes"] / 1e6))
 
 
 def gradients(spp="128", runs=16):

@@ -9,8 +9,9 @@ use fluxion::film::{Layer, Needs};
 use fluxion::metrics::METRICS;
 use fluxion::plan::Plan;
 use fluxion::reconstruct::{self, METHODS};
+use fluxion::scene::load::integrator;
 use fluxion::scene::shape::Geometry;
-use fluxion::scene::{Scene, bsdf, emitter, load, shape, texture};
+use fluxion::scene::{Scene, bsdf, emitter, load, sensor, shape, texture};
 
 /// Options of `info`.
 #[derive(clap::Args)]
@@ -87,31 +88,30 @@ fn plugins() {
     println!("| element | type | parameters |\n|---|---|---|");
     let row = |class: &str, name: &str, parameters: &str| println!("| {class} | `{name}` | {parameters} |");
     shape::PLUGINS.iter().for_each(|plugin| row("shape", plugin.name, plugin.parameters));
+    load::CONTAINERS.iter().for_each(|(name, parameters)| row("shape", name, parameters));
     bsdf::PLUGINS.iter().for_each(|plugin| row("bsdf", plugin.name, plugin.parameters));
     texture::PLUGINS.iter().for_each(|plugin| row("texture", plugin.name, plugin.parameters));
     row("emitter", "area", "radiance (in a shape)");
     emitter::PLUGINS.iter().for_each(|plugin| row("emitter", plugin.name, plugin.parameters));
-    row("sensor", "perspective", fluxion::scene::sensor::PARAMETERS);
-    row("integrator", "path", "max_depth, rr_depth");
+    sensor::PLUGINS.iter().for_each(|(name, parameters)| row("sensor", name, parameters));
+    integrator::PLUGINS.iter().for_each(|(name, parameters)| row("integrator", name, parameters));
 }
 
 fn describe(scene: &Scene, method: &str) -> Result<()> {
-    let (mut meshes, mut triangles, mut spheres) = (0, 0, 0);
-    for instance in scene.instances() {
-        match &*instance.geometry {
-            Geometry::Mesh(mesh) => {
-                meshes += 1;
-                triangles += mesh.triangles.len();
-            }
-            Geometry::Sphere(_) => spheres += 1,
+    let (mut meshes, mut triangles) = (0, 0);
+    for shape in scene.shapes() {
+        if let Geometry::Mesh(mesh) = &*shape.geometry {
+            meshes += 1;
+            triangles += mesh.triangles.len();
         }
     }
+    let others = scene.shapes().len() - meshes;
     let (sensor, integrator) = (scene.sensor(), scene.integrator());
     let depth = if integrator.max_depth == u32::MAX { "unbounded".into() } else { integrator.max_depth.to_string() };
     let (major, minor, patch) = scene.embree_version();
     println!("film         {}x{}, {} spp", sensor.width, sensor.height, sensor.spp);
     println!("paths        depth {depth}, Russian roulette from {}", integrator.rr_depth);
-    println!("shapes       {meshes} meshes with {triangles} triangles, {spheres} spheres");
+    println!("shapes       {meshes} meshes with {triangles} triangles, {others} others");
     let mut names: Vec<_> = scene.emitters().iter().map(|emitter| emitter.name()).collect();
     names.sort_unstable();
     names.dedup();

@@ -27,6 +27,9 @@ use crate::error::{Error, Result};
 
 /// Where a ray meets a surface first.
 pub use raw::FluxionHit as Hit;
+/// A disk or a cylinder.
+pub use raw::FluxionQuadric as Quadric;
+pub use raw::FluxionQuadricKind as QuadricKind;
 /// A ray; `t` counts in units of the direction's length, which need not be one.
 pub use raw::FluxionRay as Ray;
 
@@ -110,6 +113,15 @@ impl Device {
 enum Buffer {
     Triangles { _vertices: Arc<PaddedVertices>, _indices: Arc<Vec<[u32; 3]>> },
     Spheres { _spheres: Vec<[f32; 4]> },
+    Quadric { _quadric: Box<Quadric> },
+    Instance { _child: Arc<Committed> },
+}
+
+impl Hit {
+    /// The instance that was entered, if the surface is in one.
+    pub fn instance(&self) -> Option<u32> {
+        (self.instance != raw::FLUXION_NO_INSTANCE).then_some(self.instance)
+    }
 }
 
 struct SceneHandle {
@@ -195,6 +207,30 @@ impl SceneBuilder {
             raw::fluxion_scene_add_spheres(self.0.device.raw, self.0.raw, spheres.as_ptr().cast(), spheres.len())
         };
         self.0.buffers.push(Buffer::Spheres { _spheres: spheres });
+        self.0.device.check()?;
+        Ok(id)
+    }
+
+    /// Adds a disk or a cylinder and returns its geometry number.
+    pub fn add_quadric(&mut self, quadric: Quadric) -> Result<u32> {
+        let quadric = Box::new(quadric);
+        // SAFETY: the quadric is boxed and lives in `self.0.buffers` until the scene is released.
+        let id = unsafe { raw::fluxion_scene_add_quadric(self.0.device.raw, self.0.raw, &*quadric) };
+        self.0.buffers.push(Buffer::Quadric { _quadric: quadric });
+        self.0.device.check()?;
+        Ok(id)
+    }
+
+    /// Adds another scene, placed by the columns of a matrix, and returns the instance's number.
+    pub fn add_instance(&mut self, child: &Arc<Committed>, to_world: [f32; 16]) -> Result<u32> {
+        if !Arc::ptr_eq(&child.0.device, &self.0.device) {
+            return Err(Error::Embree("an instance of a scene of another device".into()));
+        }
+        // SAFETY: the child is committed, of the same device, and kept alive in `self.0.buffers`; the matrix is
+        // copied during the call.
+        let id =
+            unsafe { raw::fluxion_scene_add_instance(self.0.device.raw, self.0.raw, child.0.raw, to_world.as_ptr()) };
+        self.0.buffers.push(Buffer::Instance { _child: Arc::clone(child) });
         self.0.device.check()?;
         Ok(id)
     }

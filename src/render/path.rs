@@ -1,7 +1,7 @@
 //! Path tracing with next-event estimation and multiple importance sampling (Veach 1997), depths as Mitsuba's
 //! `path` integrator counts them.
 
-use super::Sampler;
+use super::{Sampler, View};
 use crate::film::{Features, Sample};
 use crate::math::{Rgb, Vec2, Vec3, vec2};
 use crate::scene::bsdf::{BsdfSample, Eval, Lobe};
@@ -66,22 +66,23 @@ fn power_heuristic(p: f32, q: f32) -> f32 {
     1.0 / (1.0 + ratio * ratio)
 }
 
-/// Traces the path through a film position. Edges are left zero.
-pub fn trace(scene: &Scene, sampler: &Sampler, film: Vec2, recorder: &mut impl Recorder) -> Sample {
+/// Traces the path of a view. Edges are left zero.
+pub fn trace(scene: &Scene, sampler: &Sampler, view: View, recorder: &mut impl Recorder) -> Sample {
     let integrator = scene.integrator();
-    let mut ray = scene.sensor().ray(film);
+    let mut ray = view.ray(scene);
     let mut sample = Sample { features: far(scene, ray.origin), ..Sample::default() };
     let (mut throughput, mut eta, mut depth) = (Rgb::ONE, 1.0, 0);
     let mut features = FeatureWalk::default();
     // Where the last direction came from, with its density; none for the camera.
     let mut last: Option<(Vec3, BsdfSample)> = None;
     loop {
-        let hit = scene.intersect(ray);
+        let hit = if last.is_none() { scene.intersect_from_camera(ray) } else { scene.intersect(ray) };
         let point = hit.as_ref().map_or_else(|| scene.environment(ray.direction), |hit| scene.light_point(hit));
         if let Some(point) = point.filter(|_| integrator.max_depth > 0) {
             let radiance = scene.radiance(&point, -ray.direction);
             if radiance != Rgb::ZERO {
                 match last {
+                    None if integrator.hide_emitters => {}
                     None => sample.direct = radiance,
                     Some((from, bsdf)) => {
                         let light_pdf = if bsdf.lobe.is_delta() { 0.0 } else { scene.emitter_pdf(from, &point) };
@@ -132,7 +133,11 @@ fn light(scene: &Scene, surface: &Surface, choice: f32, u: Vec2) -> Option<Light
     let (point, pdf) = scene.sample_emitter(surface, choice, u)?;
     let direction = point.direction(surface.p);
     let wo = surface.to_local(direction);
-    let eval = scene.bsdf(surface).eval(surface, surface.wi, wo);
+    let mut eval = scene.bsdf(surface).eval(surface, surface.wi, wo);
+    if point.delta {
+        // Scattering never finds it.
+        eval.pdf = 0.0;
+    }
     let radiance = scene.radiance(&point, -direction);
     let lit = eval.value * radiance != Rgb::ZERO && scene.visible(surface, &point);
     lit.then_some(Light { point, radiance, wo, eval, pdf })

@@ -1,50 +1,78 @@
 //! The scene's surfaces in Embree.
 
-use super::shape::{Bounds, Geometry};
-use super::{Instance, Ray};
-use crate::error::Result;
-use crate::ffi::embree::{self, Committed, Device, Hit};
-use crate::math::Vec3;
+use std::sync::Arc;
 
-/// A committed Embree scene; geometry numbers are instance numbers.
+use super::shape::{Bounds, Geometry};
+use super::{Group, Ray, Shape, Surface};
+use crate::error::Result;
+use crate::ffi::embree::{self, Committed, Device, Hit, SceneBuilder};
+use crate::math::{Frame, Mat4, Vec3};
+
+/// A committed Embree scene. Its geometry numbers are those of the shapes that stand by themselves, then those of the
+/// placed groups.
 pub struct Accel {
     scene: Committed,
+    placements: Vec<Placement>,
+    /// Number of the first placement.
+    first_placement: u32,
     bounds: Bounds,
     size: f32,
     version: (u32, u32, u32),
+}
+
+/// A group of shapes somewhere in the world.
+struct Placement {
+    to_world: Mat4,
+    to_group: Mat4,
+    /// Number of the group's first shape.
+    first_shape: u32,
 }
 
 /// Shadow rays end just before their target, in units of their length.
 const SHADOW_END: f32 = 1.0 - 1e-5;
 
 impl Accel {
-    /// Builds the hierarchy on `threads` threads (0: all).
-    pub fn build(instances: &[Instance], threads: usize) -> Result<Self> {
+    /// Builds the hierarchy on `threads` threads (0: all). The shapes of the groups are numbered on after `shapes`.
+    pub fn build(shapes: &[Shape], groups: &[Group], threads: usize) -> Result<Self> {
         let device = Device::new(threads)?;
         let mut builder = device.scene();
-        let mut bounds = Bounds::EMPTY;
-        for instance in instances {
-            bounds = bounds.union(instance.geometry.bounds());
-            match &*instance.geometry {
-                Geometry::Mesh(mesh) => builder.add_triangles(&mesh.positions, &mesh.triangles)?,
-                Geometry::Sphere(sphere) => {
-                    builder.add_spheres(vec![sphere.center.extend(sphere.radius).to_array()])?
-                }
-            };
+        let mut bounds = attach(&mut builder, shapes)?;
+        let mut placements = Vec::new();
+        let mut first_shape = shapes.len() as u32;
+        for group in groups {
+            let mut child = device.scene();
+            let extent = attach(&mut child, &group.shapes)?;
+            let child = Arc::new(child.commit()?);
+            for &to_world in &group.placements {
+                builder.add_instance(&child, to_world.to_cols_array())?;
+                bounds = bounds.union(extent.transformed(to_world));
+                placements.push(Placement { to_world, to_group: to_world.inverse(), first_shape });
+            }
+            first_shape += group.shapes.len() as u32;
         }
         let (_, radius) = bounds.sphere();
-        Ok(Self { scene: builder.commit()?, bounds, size: 2.0 * radius, version: device.version() })
+        let (first_placement, size) = (shapes.len() as u32, 2.0 * radius);
+        Ok(Self { scene: builder.commit()?, placements, first_placement, bounds, size, version: device.version() })
     }
 
     /// The first hit along a ray.
     #[inline]
     pub fn intersect(&self, ray: Ray) -> Option<Hit> {
+        let Ray { origin, direction, t_far } = ray;
         self.scene.intersect(&embree::Ray {
-            origin: ray.origin.to_array(),
+            origin: origin.to_array(),
             t_near: 0.0,
-            direction: ray.direction.to_array(),
-            t_far: f32::INFINITY,
+            direction: direction.to_array(),
+            t_far,
         })
+    }
+
+    /// The surface of a hit, of one of all shapes.
+    #[inline]
+    pub fn surface(&self, shapes: &[Shape], hit: &Hit, ray: Ray) -> Surface {
+        let Some(instance) = hit.instance() else { return shape_surface(shapes, hit.geometry, hit, ray) };
+        let placement = &self.placements[(instance - self.first_placement) as usize];
+        placement.surface(shapes, hit, ray)
     }
 
     /// Whether the open segment between two points meets anything.
@@ -74,5 +102,52 @@ impl Accel {
     /// Embree's version.
     pub fn version(&self) -> (u32, u32, u32) {
         self.version
+    }
+}
+
+/// Adds shapes to an Embree scene and returns the box around them.
+fn attach(builder: &mut SceneBuilder, shapes: &[Shape]) -> Result<Bounds> {
+    let mut bounds = Bounds::EMPTY;
+    for shape in shapes {
+        bounds = bounds.union(shape.geometry.bounds());
+        match &*shape.geometry {
+            Geometry::Mesh(mesh) => builder.add_triangles(&mesh.positions, &mesh.triangles)?,
+            Geometry::Sphere(sphere) => builder.add_spheres(vec![sphere.center.extend(sphere.radius).to_array()])?,
+            Geometry::Disk(disk) => builder.add_quadric(disk.quadric())?,
+            Geometry::Cylinder(cylinder) => builder.add_quadric(cylinder.quadric())?,
+        };
+    }
+    Ok(bounds)
+}
+
+fn shape_surface(shapes: &[Shape], number: u32, hit: &Hit, ray: Ray) -> Surface {
+    let shape = &shapes[number as usize];
+    let mut surface = shape.geometry.surface(hit, ray, shape.bsdf.needs_derivatives());
+    surface.at.shape = number;
+    surface
+}
+
+impl Placement {
+    /// The hit is found in the group's own coordinates, along an unnormalised ray so that distances stay the same.
+    fn surface(&self, shapes: &[Shape], hit: &Hit, ray: Ray) -> Surface {
+        let inside = Ray {
+            origin: self.to_group.transform_point3(ray.origin),
+            direction: self.to_group.transform_vector3(ray.direction),
+            t_far: ray.t_far,
+        };
+        let local = shape_surface(shapes, self.first_shape + hit.geometry, hit, inside);
+        let normals = self.to_group.transpose();
+        let normal = |n: Vec3| normals.transform_vector3(n).normalize_or_zero();
+        let tangent = self.to_world.transform_vector3(local.frame.s);
+        let frame = Frame::along(normal(local.frame.n), tangent);
+        Surface {
+            p: self.to_world.transform_point3(local.p),
+            n: normal(local.n),
+            frame,
+            dp_du: self.to_world.transform_vector3(local.dp_du),
+            dp_dv: self.to_world.transform_vector3(local.dp_dv),
+            wi: frame.to_local(-ray.direction),
+            ..local
+        }
     }
 }

@@ -21,7 +21,7 @@ use self::shape::Geometry;
 pub use self::surface::Surface;
 use crate::error::Result;
 use crate::math::discrete::Discrete;
-use crate::math::{Rgb, Vec2, Vec3};
+use crate::math::{Mat4, Rgb, Vec2, Vec3};
 
 /// A ray with a unit direction.
 #[derive(Clone, Copy, Debug)]
@@ -30,6 +30,15 @@ pub struct Ray {
     pub origin: Vec3,
     /// Where it goes, of length one.
     pub direction: Vec3,
+    /// Where it ends.
+    pub t_far: f32,
+}
+
+impl Ray {
+    /// A ray without end.
+    pub fn new(origin: Vec3, direction: Vec3) -> Self {
+        Self { origin, direction, t_far: f32::INFINITY }
+    }
 }
 
 /// How deep paths go, as Mitsuba's `path` integrator counts: edges from the sensor to the light.
@@ -39,16 +48,18 @@ pub struct Integrator {
     pub max_depth: u32,
     /// Number of scattering events after which Russian roulette begins.
     pub rr_depth: u32,
+    /// Whether the camera looks through emitters as if they were not there.
+    pub hide_emitters: bool,
 }
 
 impl Default for Integrator {
     fn default() -> Self {
-        Self { max_depth: u32::MAX, rr_depth: 5 }
+        Self { max_depth: u32::MAX, rr_depth: 5, hide_emitters: false }
     }
 }
 
-/// A shape with what it is made of.
-pub struct Instance {
+/// A surface with what it is made of.
+pub struct Shape {
     /// Its surface.
     pub geometry: Arc<Geometry>,
     /// Its material.
@@ -57,12 +68,22 @@ pub struct Instance {
     pub emitter: Option<u32>,
 }
 
-/// What a loader hands over; emitters come with whether they surround the scene.
+/// Shapes that are placed in the world together, any number of times.
+pub struct Group {
+    /// The shapes, in the group's own coordinates.
+    pub shapes: Vec<Shape>,
+    /// Group to world.
+    pub placements: Vec<Mat4>,
+}
+
+/// What a loader hands over.
 pub struct Parts {
-    /// Shapes in the order of the file.
-    pub instances: Vec<Instance>,
-    /// Emitters, numbered as the instances name them.
-    pub emitters: Vec<(Box<dyn Emitter>, bool)>,
+    /// Shapes that stand by themselves, in the order of the file.
+    pub shapes: Vec<Shape>,
+    /// Shapes that are placed as groups.
+    pub groups: Vec<Group>,
+    /// Emitters, numbered as the shapes name them.
+    pub emitters: Vec<Box<dyn Emitter>>,
     /// The camera.
     pub sensor: Sensor,
     /// Path depths.
@@ -74,7 +95,8 @@ pub struct Parts {
 /// Everything a path can meet.
 pub struct Scene {
     accel: Accel,
-    instances: Vec<Instance>,
+    /// Those that stand by themselves, then those of the groups.
+    shapes: Vec<Shape>,
     emitters: Vec<Box<dyn Emitter>>,
     /// Chance of each emitter to be chosen; `None` when nothing emits.
     emitter_choice: Option<Discrete>,
@@ -87,18 +109,19 @@ pub struct Scene {
 impl Scene {
     /// Builds the acceleration structure and the emitter choice.
     pub fn build(parts: Parts, threads: usize) -> Result<Self> {
-        let Parts { instances, emitters, sensor, integrator, fingerprint } = parts;
-        let accel = Accel::build(&instances, threads)?;
-        let surrounding: Vec<_> = (0u32..).zip(&emitters).filter(|(_, (_, around))| *around).map(|(i, _)| i).collect();
+        let Parts { mut shapes, groups, mut emitters, sensor, integrator, fingerprint } = parts;
+        let accel = Accel::build(&shapes, &groups, threads)?;
+        shapes.extend(groups.into_iter().flat_map(|group| group.shapes));
+        let numbered = (0u32..).zip(&emitters);
+        let surrounding: Vec<_> = numbered.filter(|(_, emitter)| emitter.is_environment()).map(|(i, _)| i).collect();
         if surrounding.len() > 1 {
             let what = "the scene has more than one environment (envmap or constant emitter); it can have one";
             return Err(crate::error::Error::Usage(what.into()));
         }
-        let mut emitters: Vec<_> = emitters.into_iter().map(|(emitter, _)| emitter).collect();
         emitters.iter_mut().for_each(|emitter| emitter.enclose(accel.bounds()));
         let emitter_choice = Self::choice(&emitters);
         let environment = surrounding.first().copied();
-        Ok(Self { accel, instances, emitters, emitter_choice, environment, sensor, integrator, fingerprint })
+        Ok(Self { accel, shapes, emitters, emitter_choice, environment, sensor, integrator, fingerprint })
     }
 
     /// Half of the choices go by power and half are even, so that a weak emitter close by is not starved.
@@ -113,11 +136,21 @@ impl Scene {
     /// The first surface along a ray.
     pub fn intersect(&self, ray: Ray) -> Option<Surface> {
         let hit = self.accel.intersect(ray)?;
-        let instance = &self.instances[hit.geometry as usize];
-        let mut surface = instance.geometry.surface(&hit, ray, instance.bsdf.needs_derivatives());
-        surface.instance = hit.geometry;
+        let mut surface = self.accel.surface(&self.shapes, &hit, ray);
         surface.epsilon = self.epsilon(surface.p);
         Some(surface)
+    }
+
+    /// The first surface along a camera ray, which passes emitters when they are to be hidden.
+    pub fn intersect_from_camera(&self, mut ray: Ray) -> Option<Surface> {
+        loop {
+            let surface = self.intersect(ray)?;
+            if !self.integrator.hide_emitters || self.shapes[surface.at.shape as usize].emitter.is_none() {
+                return Some(surface);
+            }
+            let origin = surface.leave(ray.direction);
+            ray = Ray { origin, t_far: ray.t_far - origin.distance(ray.origin), ..ray };
+        }
     }
 
     fn epsilon(&self, p: Vec3) -> f32 {
@@ -131,6 +164,7 @@ impl Scene {
                 let end = surface::offset(p, n, self.epsilon(p), from.p - p);
                 !self.accel.blocked(from.leave(p - from.p), end)
             }
+            emitter::Position::Point { p } => !self.accel.blocked(from.leave(p - from.p), p),
             emitter::Position::Infinity { direction } => {
                 !self.accel.blocked_to_infinity(from.leave(direction), direction)
             }
@@ -144,7 +178,7 @@ impl Scene {
 
     /// The material of a surface.
     pub fn bsdf(&self, surface: &Surface) -> &dyn Bsdf {
-        &*self.instances[surface.instance as usize].bsdf
+        &*self.shapes[surface.at.shape as usize].bsdf
     }
 
     /// A point on an emitter, with its density per solid angle at `from` including the choice of emitter.
@@ -171,7 +205,7 @@ impl Scene {
 
     /// The surface as a point of its emitter, if it is one.
     pub fn light_point(&self, surface: &Surface) -> Option<LightPoint> {
-        let emitter = self.instances[surface.instance as usize].emitter?;
+        let emitter = self.shapes[surface.at.shape as usize].emitter?;
         Some(LightPoint::on_surface(surface, emitter))
     }
 
@@ -190,9 +224,9 @@ impl Scene {
         self.integrator
     }
 
-    /// Shapes with their materials.
-    pub fn instances(&self) -> &[Instance] {
-        &self.instances
+    /// Shapes with their materials; those of a group once, however often it is placed.
+    pub fn shapes(&self) -> &[Shape] {
+        &self.shapes
     }
 
     /// All emitters.

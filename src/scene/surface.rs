@@ -1,7 +1,7 @@
 //! A point where a ray meets a shape.
 
-use super::Ray;
-use crate::math::{Frame, Vec2, Vec3};
+use super::{Ray, texture};
+use crate::math::{Frame, Vec3};
 
 /// A surface point with its two normals and what textures need. Directions at a surface point away from it.
 #[derive(Clone, Copy, Debug)]
@@ -12,8 +12,8 @@ pub struct Surface {
     pub n: Vec3,
     /// Shading frame.
     pub frame: Frame,
-    /// Texture coordinates.
-    pub uv: Vec2,
+    /// Where textures are looked up.
+    pub at: texture::Point,
     /// Change of position along u. Zero unless the material asked for it.
     pub dp_du: Vec3,
     /// Change of position along v. Zero unless the material asked for it.
@@ -22,8 +22,6 @@ pub struct Surface {
     pub epsilon: f32,
     /// Direction back to where the ray came from, in the shading frame.
     pub wi: Vec3,
-    /// Number of the shape.
-    pub instance: u32,
 }
 
 /// Distance at which rays start off a surface, per size of coordinate. Far more than rounding asks for: scenes
@@ -53,7 +51,7 @@ impl Surface {
     /// The ray that leaves along the local direction `wo`.
     pub fn ray(&self, wo: Vec3) -> Ray {
         let direction = self.frame.to_world(wo).normalize();
-        Ray { origin: self.leave(direction), direction }
+        Ray::new(self.leave(direction), direction)
     }
 
     /// World to shading frame.

@@ -5,9 +5,8 @@ pub mod shift;
 
 use self::base_path::BasePath;
 use self::shift::Shift;
-use super::{SampleId, Sampler, path};
+use super::{SampleId, Sampler, View, path};
 use crate::film::{EDGES, Sample};
-use crate::math::{Vec2, vec2};
 use crate::scene::Scene;
 
 /// Traces samples with their differences to the neighbours; keeps its buffers between samples.
@@ -23,9 +22,9 @@ impl Tracer {
     }
 
     /// The path tracer's sample, bit for bit, with this pixel's end of each edge.
-    pub fn sample(&mut self, scene: &Scene, sampler: &Sampler, film: Vec2, id: SampleId) -> Sample {
+    pub fn sample(&mut self, scene: &Scene, sampler: &Sampler, view: View, id: SampleId) -> Sample {
         self.base.clear();
-        let mut sample = path::trace(scene, sampler, film, &mut self.base);
+        let mut sample = path::trace(scene, sampler, view, &mut self.base);
         if self.base.is_dark() {
             return sample;
         }
@@ -33,8 +32,7 @@ impl Tracer {
         for (edge, (dx, dy)) in sample.edges.iter_mut().zip(EDGES) {
             let (x, y) = (id.x as i64 + i64::from(dx), id.y as i64 + i64::from(dy));
             if x >= 0 && y >= 0 && x < size.0 && y < size.1 {
-                let ray = scene.sensor().ray(film + vec2(dx as f32, dy as f32));
-                *edge = self.shift.difference(scene, &self.base, ray);
+                *edge = self.shift.difference(scene, &self.base, view.moved((dx, dy)).ray(scene));
             }
         }
         sample

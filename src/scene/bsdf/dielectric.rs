@@ -59,7 +59,7 @@ impl Bsdf for Dielectric {
             }
             _ => return None,
         };
-        let value = tint.color(surface.uv) * (probability * scale);
+        let value = tint.color(&surface.at) * (probability * scale);
         (probability > 0.0).then_some(Delta { wo, value, probability })
     }
 
@@ -68,7 +68,7 @@ impl Bsdf for Dielectric {
     }
 
     fn albedo(&self, surface: &Surface) -> Rgb {
-        self.transmittance.color(surface.uv).clamp(Rgb::ZERO, Rgb::ONE)
+        self.transmittance.color(&surface.at).clamp(Rgb::ZERO, Rgb::ONE)
     }
 
     fn transmits(&self) -> bool {

@@ -33,7 +33,7 @@ impl Bsdf for Diffuse {
         if wi.z <= 0.0 || wo.z <= 0.0 {
             return None;
         }
-        let weight = self.reflectance.color(surface.uv);
+        let weight = self.reflectance.color(&surface.at);
         Some(BsdfSample { wo, weight, pdf: warp::cosine_hemisphere_pdf(wo.z), lobe: Lobe::Smooth, eta: 1.0 })
     }
 
@@ -41,7 +41,7 @@ impl Bsdf for Diffuse {
         if wi.z <= 0.0 || wo.z <= 0.0 {
             return Eval::default();
         }
-        let value = self.reflectance.color(surface.uv) * (FRAC_1_PI * wo.z);
+        let value = self.reflectance.color(&surface.at) * (FRAC_1_PI * wo.z);
         Eval { value, pdf: warp::cosine_hemisphere_pdf(wo.z) }
     }
 
@@ -50,6 +50,6 @@ impl Bsdf for Diffuse {
     }
 
     fn albedo(&self, surface: &Surface) -> Rgb {
-        self.reflectance.color(surface.uv).clamp(Rgb::ZERO, Rgb::ONE)
+        self.reflectance.color(&surface.at).clamp(Rgb::ZERO, Rgb::ONE)
     }
 }

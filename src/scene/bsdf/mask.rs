@@ -25,7 +25,7 @@ struct Mask {
 
 impl Mask {
     fn opacity(&self, surface: &Surface) -> f32 {
-        self.opacity.scalar(surface.uv).clamp(0.0, 1.0)
+        self.opacity.scalar(&surface.at).clamp(0.0, 1.0)
     }
 }
 
@@ -65,6 +65,10 @@ impl Bsdf for Mask {
 
     fn transmits(&self) -> bool {
         true
+    }
+
+    fn refraction(&self) -> Option<f32> {
+        self.nested.refraction()
     }
 
     fn needs_derivatives(&self) -> bool {

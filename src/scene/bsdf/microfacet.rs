@@ -1,4 +1,4 @@
-//! Microfacet distributions: Beckmann and GGX, isotropic, with sampling of visible normals.
+//! Microfacet distributions: Beckmann and GGX with sampling of visible normals.
 //!
 //! Walter et al. 2007 for the distributions and Smith's shadowing; Heitz and d'Eon 2014 for visible normals.
 
@@ -6,6 +6,7 @@ use std::f32::consts::FRAC_1_PI;
 use std::sync::Arc;
 
 use crate::error::Result;
+use crate::math::quadrature::gauss_legendre;
 use crate::math::{Rgb, Vec2, Vec3, vec2, vec3, warp};
 use crate::scene::Surface;
 use crate::scene::load::Loader;
@@ -29,33 +30,68 @@ pub enum Kind {
 pub struct Microfacet {
     /// Shape.
     pub kind: Kind,
-    /// Root mean square slope (times √2 for Beckmann's convention).
-    pub alpha: f32,
+    /// Root mean square slope along both tangents (times √2 for Beckmann's convention).
+    pub alpha: Vec2,
 }
 
 /// A roughness that may vary over the surface.
 pub struct Roughness {
     kind: Kind,
-    alpha: Arc<dyn Texture>,
+    /// Along the first tangent, or both.
+    u: Arc<dyn Texture>,
+    /// Along the second tangent where that is different.
+    v: Option<Arc<dyn Texture>>,
 }
 
 impl Roughness {
-    /// From `distribution` and `alpha`.
+    /// From `distribution` and `alpha`, or `alpha_u` and `alpha_v`. Visible normals are always sampled.
     pub fn load(object: &Object, loader: &mut Loader) -> Result<Self> {
-        let kind = [Kind::Beckmann, Kind::Ggx][object.choice("distribution", &["beckmann", "ggx"], 0)?];
-        Ok(Self { kind, alpha: loader.texture(object, "alpha", Rgb::splat(0.1))? })
+        object.ignore(&["sample_visible"]);
+        let kind = Kind::load(object)?;
+        let mut alpha = |name: &str| loader.texture(object, name, Rgb::splat(0.1));
+        match (object.get("alpha_u").is_some(), object.get("alpha_v").is_some()) {
+            (false, false) => Ok(Self { kind, u: alpha("alpha")?, v: None }),
+            (true, true) if object.get("alpha").is_none() => {
+                Ok(Self { kind, u: alpha("alpha_u")?, v: Some(alpha("alpha_v")?) })
+            }
+            _ => Err(object.place_of("alpha_u").invalid("give either `alpha`, or both `alpha_u` and `alpha_v`")),
+        }
     }
 
     /// The distribution at a surface point.
     pub fn at(&self, surface: &Surface) -> Microfacet {
-        Microfacet::new(self.kind, self.alpha.scalar(surface.uv))
+        let u = self.u.scalar(&surface.at);
+        let v = self.v.as_ref().map_or(u, |v| v.scalar(&surface.at));
+        Microfacet::anisotropic(self.kind, vec2(u, v))
+    }
+
+    /// Whether the tangents matter.
+    pub fn is_anisotropic(&self) -> bool {
+        self.v.is_some()
+    }
+}
+
+impl Kind {
+    /// From `distribution`.
+    pub fn load(object: &Object) -> Result<Self> {
+        Ok([Self::Beckmann, Self::Ggx][object.choice("distribution", &["beckmann", "ggx"], 0)?])
     }
 }
 
 impl Microfacet {
-    /// `alpha` is kept at or above 1e-4.
+    /// The same roughness in all directions.
     pub fn new(kind: Kind, alpha: f32) -> Self {
-        Self { kind, alpha: alpha.max(MIN_ALPHA) }
+        Self::anisotropic(kind, Vec2::splat(alpha))
+    }
+
+    /// `alpha` is kept at or above 1e-4.
+    pub fn anisotropic(kind: Kind, alpha: Vec2) -> Self {
+        Self { kind, alpha: alpha.max(Vec2::splat(MIN_ALPHA)) }
+    }
+
+    /// The smaller roughness.
+    pub fn smallest(&self) -> f32 {
+        self.alpha.min_element()
     }
 
     /// Density of facet normals `m` per solid angle of normal, per projected area: ∫ D cos θ dω = 1.
@@ -63,8 +99,8 @@ impl Microfacet {
         if m.z <= 0.0 {
             return 0.0;
         }
-        let (a2, cos2) = (self.alpha * self.alpha, m.z * m.z);
-        let slope2 = (m.x * m.x + m.y * m.y) / a2;
+        let (a2, cos2) = (self.alpha.x * self.alpha.y, m.z * m.z);
+        let slope2 = (m.truncate() / self.alpha).length_squared();
         let value = match self.kind {
             Kind::Beckmann => (-slope2 / cos2).exp() * FRAC_1_PI / (a2 * cos2 * cos2),
             Kind::Ggx => FRAC_1_PI / (a2 * (slope2 + cos2) * (slope2 + cos2)),
@@ -78,7 +114,7 @@ impl Microfacet {
         if v.dot(m) * v.z <= 0.0 {
             return 0.0;
         }
-        let tan2 = (v.x * v.x + v.y * v.y) / (v.z * v.z) * self.alpha * self.alpha;
+        let tan2 = (v.truncate() * self.alpha).length_squared() / (v.z * v.z);
         if tan2 == 0.0 {
             return 1.0;
         }
@@ -96,18 +132,22 @@ impl Microfacet {
         self.d(m) * self.g1(wi, m) / (4.0 * wi.z)
     }
 
+    /// Density of [`Microfacet::sample_visible`] per solid angle of normal.
+    pub fn visible_pdf(&self, wi: Vec3, m: Vec3) -> f32 {
+        self.d(m) * self.g1(wi, m) * (wi.dot(m) / wi.z).abs()
+    }
+
     /// A normal in proportion to its visible area from `wi` (wi.z > 0); density D G1 wi·m / cos θi.
     pub fn sample_visible(&self, wi: Vec3, u: Vec2) -> Vec3 {
-        let stretched = vec3(self.alpha * wi.x, self.alpha * wi.y, wi.z).normalize();
+        let stretched = (self.alpha * wi.truncate()).extend(wi.z).normalize();
         let sin = vec2(stretched.x, stretched.y).length();
         let (cos_phi, sin_phi) = if sin > 0.0 { (stretched.x / sin, stretched.y / sin) } else { (1.0, 0.0) };
         let slope = match self.kind {
             Kind::Beckmann => beckmann_slope(stretched.z, sin, u),
             Kind::Ggx => ggx_slope(stretched.z, sin, u),
         };
-        let x = self.alpha * (cos_phi * slope.x - sin_phi * slope.y);
-        let y = self.alpha * (sin_phi * slope.x + cos_phi * slope.y);
-        vec3(-x, -y, 1.0).normalize()
+        let turned = vec2(cos_phi * slope.x - sin_phi * slope.y, sin_phi * slope.x + cos_phi * slope.y);
+        (-self.alpha * turned).extend(1.0).normalize()
     }
 }
 
@@ -193,12 +233,13 @@ pub struct RoughTransmittance {
 
 impl RoughTransmittance {
     const NODES: usize = 64;
-    const QUADRATURE: usize = 40;
+    const QUADRATURE: usize = 32;
 
     /// Tabulates for relative index `eta` > 1. The transmittance counts light that is refracted and not masked
     /// on its way out; the internal reflectance is the mean of 2 R(µ) µ over the nodes.
     pub fn new(facets: Microfacet, eta: f32) -> Self {
         use crate::math::fresnel;
+        let rule = gauss_legendre(Self::QUADRATURE);
         let node = |k: usize| (k as f32 / (Self::NODES - 1) as f32).max(1e-6);
         let transmitted = |wi: Vec3, m: Vec3| {
             let found = fresnel::dielectric(wi.dot(m), eta);
@@ -211,11 +252,11 @@ impl RoughTransmittance {
         };
         let average = |mu: f32, term: &dyn Fn(Vec3, Vec3) -> f32| {
             let wi = vec3((1.0 - mu * mu).max(0.0).sqrt(), 0.0, mu);
-            let n = Self::QUADRATURE;
-            let cell = |i: usize| (i as f32 + 0.5) / n as f32;
-            let sum: f32 =
-                (0..n * n).map(|i| term(wi, facets.sample_visible(wi, vec2(cell(i % n), cell(i / n))))).sum();
-            sum / (n * n) as f32
+            let row = |&(v, weight): &(f32, f32)| {
+                let value = |&(u, weight): &(f32, f32)| weight * term(wi, facets.sample_visible(wi, vec2(u, v)));
+                weight * rule.iter().map(value).sum::<f32>()
+            };
+            rule.iter().map(row).sum::<f32>()
         };
         let table = std::array::from_fn(|k| average(node(k), &transmitted));
         let internal = (0..Self::NODES).map(|k| 2.0 * node(k) * average(node(k), &reflected)).sum::<f32>();
@@ -242,6 +283,7 @@ mod tests {
     fn each(mut check: impl FnMut(Microfacet)) {
         for kind in [Kind::Beckmann, Kind::Ggx] {
             ALPHAS.into_iter().for_each(|alpha| check(Microfacet::new(kind, alpha)));
+            check(Microfacet::anisotropic(kind, vec2(0.3, 0.1)));
         }
     }
 
@@ -266,10 +308,10 @@ mod tests {
     #[test]
     fn projected_area_is_one_and_visible_area_is_the_cosine() {
         each(|facets| {
-            let area = integrate(|m| facets.d(m) * m.z, facets.alpha);
+            let area = integrate(|m| facets.d(m) * m.z, facets.alpha.x);
             assert!((area - 1.0).abs() < 2e-3, "{facets:?}: {area}");
             for wi in [vec3(0.0, 0.0, 1.0), vec3(0.8, 0.0, 0.6), vec3(0.0, 0.98, 0.199)] {
-                let visible = integrate(|m| facets.d(m) * facets.g1(wi, m) * wi.dot(m).max(0.0), facets.alpha);
+                let visible = integrate(|m| facets.d(m) * facets.g1(wi, m) * wi.dot(m).max(0.0), facets.alpha.x);
                 // Exact for GGX; the rational fit of Beckmann's masking is good to half a percent.
                 let tolerance = if facets.kind == Kind::Ggx { 3e-3 } else { 1e-2 };
                 assert!((visible / f64::from(wi.z) - 1.0).abs() < tolerance, "{facets:?} {wi}: {visible}");
@@ -288,7 +330,7 @@ mod tests {
                     sampled += facets.sample_visible(wi, vec2(cell(i % n), cell(i / n))) / (n * n) as f32;
                 }
                 let pdf = |m: Vec3| facets.d(m) * facets.g1(wi, m) * wi.dot(m).max(0.0) / wi.z;
-                let expected = [0, 1, 2].map(|axis| integrate(|m| pdf(m) * m[axis], facets.alpha) as f32);
+                let expected = [0, 1, 2].map(|axis| integrate(|m| pdf(m) * m[axis], facets.alpha.x) as f32);
                 assert!(sampled.distance(Vec3::from_array(expected)) < 1e-2, "{facets:?} {wi}: {sampled} {expected:?}");
             }
         });

@@ -1,14 +1,21 @@
 //! Materials. Directions are local (the shading normal is +z) and point away from the surface; `wi` is where the
 //! path came from, `wo` where it goes.
 
+mod bent;
+mod blendbsdf;
 mod bumpmap;
 mod conductor;
 mod dielectric;
 mod diffuse;
 mod mask;
+mod metals;
 pub mod microfacet;
+mod normalmap;
+mod null;
 mod plastic;
+mod principled;
 mod roughconductor;
+mod roughdielectric;
 mod roughplastic;
 mod thindielectric;
 mod twosided;
@@ -27,12 +34,18 @@ pub const PLUGINS: &[Plugin<Arc<dyn Bsdf>>] = &[
     conductor::PLUGIN,
     roughconductor::PLUGIN,
     dielectric::PLUGIN,
+    roughdielectric::PLUGIN,
     thindielectric::PLUGIN,
     plastic::PLUGIN,
     roughplastic::PLUGIN,
+    principled::PLUGIN,
+    principled::thin::PLUGIN,
     twosided::PLUGIN,
     mask::PLUGIN,
+    blendbsdf::PLUGIN,
     bumpmap::PLUGIN,
+    normalmap::PLUGIN,
+    null::PLUGIN,
 ];
 
 /// The material of a shape that names none.
@@ -118,6 +131,11 @@ pub trait Bsdf: Send + Sync {
     /// Whether light can pass to the other side.
     fn transmits(&self) -> bool {
         false
+    }
+
+    /// Interior over exterior index of refraction of the smooth lobes that refract, if there are such.
+    fn refraction(&self) -> Option<f32> {
+        None
     }
 
     /// Whether surfaces need dp_du and dp_dv.

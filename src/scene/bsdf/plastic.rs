@@ -49,12 +49,12 @@ impl Base {
 
     /// Colour of the coat's reflection.
     pub fn specular(&self, surface: &Surface) -> Rgb {
-        self.specular.color(surface.uv)
+        self.specular.color(&surface.at)
     }
 
     /// f |cos θo| of the base, for transmitted shares `t` of the coat in both directions together.
     pub fn value(&self, surface: &Surface, cos_o: f32, t: f32) -> Rgb {
-        let color = self.diffuse.color(surface.uv);
+        let color = self.diffuse.color(&surface.at);
         let returned = if self.nonlinear { color * self.internal } else { Rgb::splat(self.internal) };
         color / (Rgb::ONE - returned) * (FRAC_1_PI * cos_o * self.inverse_eta_squared * t)
     }
@@ -68,7 +68,7 @@ impl Base {
 
     /// The base's colour with the coat's white, as a feature.
     pub fn albedo(&self, surface: &Surface) -> Rgb {
-        self.diffuse.color(surface.uv).clamp(Rgb::ZERO, Rgb::ONE)
+        self.diffuse.color(&surface.at).clamp(Rgb::ZERO, Rgb::ONE)
     }
 }
 

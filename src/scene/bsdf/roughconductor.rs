@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::conductor::Metal;
-use super::microfacet::{Microfacet, Roughness};
+use super::microfacet::Roughness;
 use super::{Bsdf, BsdfSample, Eval, Lobe};
 use crate::error::Result;
 use crate::math::{Rgb, Vec2, Vec3, fresnel};
@@ -11,15 +11,15 @@ use crate::scene::Surface;
 use crate::scene::load::props::Object;
 use crate::scene::load::{Loader, Plugin};
 
-/// `roughconductor`. Visible normals are always sampled.
+/// `roughconductor`.
 pub const PLUGIN: Plugin<Arc<dyn Bsdf>> = Plugin {
     name: "roughconductor",
-    parameters: "material, eta, k, specular_reflectance, alpha, distribution (beckmann, ggx), sample_visible",
+    parameters: "material, eta, k, specular_reflectance, alpha or alpha_u and alpha_v, distribution (beckmann, ggx), \
+        sample_visible (ignored)",
     make,
 };
 
 fn make(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Bsdf>> {
-    object.ignore(&["sample_visible"]);
     Ok(Arc::new(RoughConductor { metal: Metal::load(object, loader)?, roughness: Roughness::load(object, loader)? }))
 }
 
@@ -55,11 +55,14 @@ impl Bsdf for RoughConductor {
     }
 
     fn roughness(&self, surface: &Surface) -> Option<f32> {
-        let Microfacet { alpha, .. } = self.roughness.at(surface);
-        Some(alpha)
+        Some(self.roughness.at(surface).smallest())
     }
 
     fn albedo(&self, surface: &Surface) -> Rgb {
         self.metal.reflectance(surface, 1.0).clamp(Rgb::ZERO, Rgb::ONE)
+    }
+
+    fn needs_derivatives(&self) -> bool {
+        self.roughness.is_anisotropic()
     }
 }

@@ -11,7 +11,7 @@ use crate::scene::Surface;
 use crate::scene::load::props::Object;
 use crate::scene::load::{Loader, Plugin};
 
-/// `roughplastic`. Visible normals are always sampled.
+/// `roughplastic`.
 pub const PLUGIN: Plugin<Arc<dyn Bsdf>> = Plugin {
     name: "roughplastic",
     parameters: "int_ior, ext_ior, diffuse_reflectance, specular_reflectance, nonlinear, alpha, \
@@ -20,13 +20,13 @@ pub const PLUGIN: Plugin<Arc<dyn Bsdf>> = Plugin {
 };
 
 fn make(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Bsdf>> {
+    // Visible normals are always sampled.
     object.ignore(&["sample_visible"]);
     let eta = relative_ior(object, POLYPROPYLENE)?;
     if eta <= 1.0 {
         return Err(object.place.unsupported("roughplastic with an interior no denser than its exterior"));
     }
-    let kind = [Kind::Beckmann, Kind::Ggx][object.choice("distribution", &["beckmann", "ggx"], 0)?];
-    let facets = Microfacet::new(kind, object.float("alpha", 0.1)?);
+    let facets = Microfacet::new(Kind::load(object)?, object.float("alpha", 0.1)?);
     let transmittance = RoughTransmittance::new(facets, eta);
     let base = Base::load(object, loader, eta, transmittance.internal)?;
     Ok(Arc::new(RoughPlastic { eta, facets, transmittance, base }))
@@ -70,7 +70,7 @@ impl Bsdf for RoughPlastic {
     }
 
     fn roughness(&self, _surface: &Surface) -> Option<f32> {
-        Some(self.facets.alpha)
+        Some(self.facets.smallest())
     }
 
     fn albedo(&self, surface: &Surface) -> Rgb {

@@ -57,7 +57,7 @@ impl Bsdf for ThinDielectric {
             Lobe::Null => (-wi, &self.transmittance, 1.0 - reflectance),
             _ => return None,
         };
-        (probability > 0.0).then(|| Delta { wo, value: tint.color(surface.uv) * probability, probability })
+        (probability > 0.0).then(|| Delta { wo, value: tint.color(&surface.at) * probability, probability })
     }
 
     fn roughness(&self, _surface: &Surface) -> Option<f32> {
@@ -65,7 +65,7 @@ impl Bsdf for ThinDielectric {
     }
 
     fn albedo(&self, surface: &Surface) -> Rgb {
-        self.transmittance.color(surface.uv).clamp(Rgb::ZERO, Rgb::ONE)
+        self.transmittance.color(&surface.at).clamp(Rgb::ZERO, Rgb::ONE)
     }
 
     fn transmits(&self) -> bool {

@@ -12,20 +12,21 @@ use crate::scene::texture::Texture;
 pub struct Area {
     geometry: Arc<Geometry>,
     radiance: Arc<dyn Texture>,
-    /// Number of the shape.
-    pub instance: u32,
+    shape: u32,
 }
 
 impl Area {
-    /// A glowing shape.
-    pub fn new(geometry: Arc<Geometry>, radiance: Arc<dyn Texture>, instance: u32) -> Self {
-        Self { geometry, radiance, instance }
+    /// A glowing shape and its number.
+    pub fn new(geometry: Arc<Geometry>, radiance: Arc<dyn Texture>, shape: u32) -> Self {
+        Self { geometry, radiance, shape }
     }
 }
 
 impl Emitter for Area {
     fn sample(&self, from: Vec3, u: Vec2) -> Option<LightPoint> {
-        self.geometry.sample(from, u)
+        let mut point = self.geometry.sample(from, u)?;
+        point.at.shape = self.shape;
+        Some(point)
     }
 
     fn pdf(&self, from: Vec3, point: &LightPoint) -> f32 {
@@ -34,7 +35,7 @@ impl Emitter for Area {
 
     fn radiance(&self, point: &LightPoint, direction: Vec3) -> Rgb {
         match point.position {
-            Position::Surface { n, .. } if n.dot(direction) > 0.0 => self.radiance.color(point.uv),
+            Position::Surface { n, .. } if n.dot(direction) > 0.0 => self.radiance.color(&point.at),
             _ => Rgb::ZERO,
         }
     }

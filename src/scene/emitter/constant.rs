@@ -13,10 +13,7 @@ use crate::scene::load::{Loader, Plugin};
 pub const PLUGIN: Plugin<Box<dyn Emitter>> = Plugin { name: "constant", parameters: "radiance", make };
 
 fn make(object: &Object, loader: &mut Loader) -> Result<Box<dyn Emitter>> {
-    let radiance = loader.radiance(object, "radiance")?;
-    let place = object.place_of("radiance");
-    let radiance = radiance.constant().ok_or_else(|| place.unsupported("a textured `constant`; use envmap"))?;
-    Ok(Box::new(Constant { radiance, area: 1.0 }))
+    Ok(Box::new(Constant { radiance: loader.uniform_radiance(object, "radiance")?, area: 1.0 }))
 }
 
 struct Constant {
@@ -45,6 +42,10 @@ impl Emitter for Constant {
     fn enclose(&mut self, scene: Bounds) {
         let (_, radius) = scene.sphere();
         self.area = PI * radius * radius;
+    }
+
+    fn is_environment(&self) -> bool {
+        true
     }
 
     fn name(&self) -> &'static str {

@@ -13,11 +13,13 @@ use crate::scene::load::{Loader, Plugin};
 use crate::scene::texture::Texels;
 
 /// `envmap`.
-pub const PLUGIN: Plugin<Box<dyn Emitter>> = Plugin { name: "envmap", parameters: "filename, scale, to_world", make };
+pub const PLUGIN: Plugin<Box<dyn Emitter>> =
+    Plugin { name: "envmap", parameters: "filename, scale, to_world, mis_compensation (ignored)", make };
 
 fn make(object: &Object, loader: &mut Loader) -> Result<Box<dyn Emitter>> {
     let scale = object.float("scale", 1.0)?;
     let to_world = object.transform("to_world")?;
+    object.ignore(&["mis_compensation"]);
     let texels = {
         let path = loader.file(object)?;
         loader.texels(path)?
@@ -97,7 +99,7 @@ impl Emitter for EnvMap {
     fn radiance(&self, point: &LightPoint, _direction: Vec3) -> Rgb {
         match point.position {
             Position::Infinity { direction } => self.look_up(self.uv(direction)),
-            Position::Surface { .. } => Rgb::ZERO,
+            Position::Surface { .. } | Position::Point { .. } => Rgb::ZERO,
         }
     }
 
@@ -108,6 +110,10 @@ impl Emitter for EnvMap {
     fn enclose(&mut self, scene: Bounds) {
         let (_, radius) = scene.sphere();
         self.area = PI * radius * radius;
+    }
+
+    fn is_environment(&self) -> bool {
+        true
     }
 
     fn name(&self) -> &'static str {

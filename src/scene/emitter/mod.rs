@@ -3,15 +3,19 @@
 
 mod area;
 mod constant;
+mod directional;
 mod envmap;
+mod point;
+mod spot;
 
 pub use self::area::Area;
 use super::load::Plugin;
-use super::{Bounds, Surface};
+use super::{Bounds, Surface, texture};
 use crate::math::{Rgb, Vec2, Vec3};
 
 /// The emitters that stand by themselves in scene files. (`area` stands in a shape.)
-pub const PLUGINS: &[Plugin<Box<dyn Emitter>>] = &[envmap::PLUGIN, constant::PLUGIN];
+pub const PLUGINS: &[Plugin<Box<dyn Emitter>>] =
+    &[envmap::PLUGIN, constant::PLUGIN, point::PLUGIN, spot::PLUGIN, directional::PLUGIN];
 
 /// Where light starts.
 #[derive(Clone, Copy, Debug)]
@@ -22,6 +26,11 @@ pub enum Position {
         p: Vec3,
         /// Normal on the emitting side.
         n: Vec3,
+    },
+    /// A point without extent, which shines like a small sphere that turns the same side to everyone.
+    Point {
+        /// Position.
+        p: Vec3,
     },
     /// Infinitely far away.
     Infinity {
@@ -35,29 +44,42 @@ pub enum Position {
 pub struct LightPoint {
     /// Where it is.
     pub position: Position,
-    /// Texture coordinates on its shape.
-    pub uv: Vec2,
+    /// Where on its shape it is.
+    pub at: texture::Point,
     /// Number of its emitter.
     pub emitter: u32,
+    /// Whether no other point of its emitter lights a position, so that no path can run into it.
+    pub delta: bool,
 }
 
 impl LightPoint {
     /// A surface that was hit, as a point of its emitter.
     pub fn on_surface(surface: &Surface, emitter: u32) -> Self {
         let position = Position::Surface { p: surface.p, n: surface.n };
-        Self { position, uv: surface.uv, emitter }
+        Self { position, at: surface.at, emitter, delta: false }
+    }
+
+    /// A point drawn on a shape; the numbers of the shape and of its emitter are left to whom they belong to.
+    pub fn drawn(position: Position, at: texture::Point) -> Self {
+        Self { position, at, emitter: 0, delta: false }
     }
 
     /// The environment in a direction.
     pub fn at_infinity(direction: Vec3, emitter: u32) -> Self {
-        Self { position: Position::Infinity { direction }, uv: Vec2::ZERO, emitter }
+        let position = Position::Infinity { direction };
+        Self { position, at: texture::Point::default(), emitter, delta: false }
+    }
+
+    /// The only point that an emitter has.
+    pub fn only(position: Position) -> Self {
+        Self { position, at: texture::Point::default(), emitter: 0, delta: true }
     }
 
     /// Unit direction from `from` towards the point.
     #[inline]
     pub fn direction(&self, from: Vec3) -> Vec3 {
         match self.position {
-            Position::Surface { p, .. } => (p - from).normalize_or_zero(),
+            Position::Surface { p, .. } | Position::Point { p } => (p - from).normalize_or_zero(),
             Position::Infinity { direction } => direction,
         }
     }
@@ -68,8 +90,8 @@ impl LightPoint {
         if factor > 0.0 { density / factor } else { 0.0 }
     }
 
-    /// Solid angle at `from` per area around the point: |cos θ| / d² on its emitting side, else 0. At infinity
-    /// it is 1 from everywhere.
+    /// Solid angle at `from` per area around the point: |cos θ| / d² on its emitting side, else 0. A point without
+    /// extent is seen at cos θ = 1 from everywhere; at infinity the ratio is 1.
     #[inline]
     pub fn solid_angle(&self, from: Vec3) -> f32 {
         match self.position {
@@ -79,6 +101,7 @@ impl LightPoint {
                 let cos = n.dot(to) / distance_squared.sqrt();
                 if cos > 0.0 { cos / distance_squared } else { 0.0 }
             }
+            Position::Point { p } => 1.0 / from.distance_squared(p),
             Position::Infinity { .. } => 1.0,
         }
     }
@@ -89,7 +112,7 @@ pub trait Emitter: Send + Sync {
     /// A point to light `from` with; its emitter number is left to the scene.
     fn sample(&self, from: Vec3, u: Vec2) -> Option<LightPoint>;
 
-    /// Density of [`Emitter::sample`] per solid angle at `from`.
+    /// Density of [`Emitter::sample`] per solid angle at `from`; for an only point, over its area taken as one.
     fn pdf(&self, from: Vec3, point: &LightPoint) -> f32;
 
     /// Radiance sent by `point` along `direction`, which points away from the emitter.
@@ -100,6 +123,11 @@ pub trait Emitter: Send + Sync {
 
     /// Told once what the emitter lights, for those that surround it.
     fn enclose(&mut self, _scene: Bounds) {}
+
+    /// Whether rays that meet nothing end on it.
+    fn is_environment(&self) -> bool {
+        false
+    }
 
     /// The plugin's name.
     fn name(&self) -> &'static str;

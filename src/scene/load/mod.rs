@@ -1,10 +1,15 @@
 //! Scene files to a [`Scene`]: `xml` reads the text into objects, the plugin tables of the sibling folders turn
 //! objects into what they describe. Everything that can fail fails here.
 
+mod cie;
+mod contents;
+pub mod integrator;
+mod legacy;
 mod obj;
 mod ply;
 pub mod props;
 mod serialized;
+mod spectrum;
 mod transform;
 mod xml;
 
@@ -13,14 +18,15 @@ use std::path::{Path, PathBuf};
 use std::rc::Rc;
 use std::sync::Arc;
 
+pub use self::contents::CONTAINERS;
+use self::contents::Contents;
 use self::props::{Object, Property, Value};
 use super::bsdf::{self, Bsdf};
-use super::emitter::{self, Emitter};
-use super::shape::{self, Geometry};
+use super::shape::Geometry;
 use super::texture::{self, Texture};
-use super::{Instance, Integrator, Parts, Scene, sensor};
+use super::{Parts, Scene, sensor};
 use crate::error::{Error, Place, Result};
-use crate::math::{Rgb, Vec2, Vec3, rng, vec3};
+use crate::math::{Rgb, Vec2, Vec3, rng};
 
 /// Nesting deeper than this (a BSDF in a BSDF in ...) is taken for a loop of references.
 const MAX_NESTING: usize = 32;
@@ -50,6 +56,8 @@ pub struct MeshData {
     pub uvs: Vec<Vec2>,
     /// Vertex numbers, counter-clockwise seen from outside.
     pub triangles: Vec<[u32; 3]>,
+    /// Values by name: one a vertex under `vertex_...`, one a triangle under `face_...`.
+    pub attributes: Vec<(String, Vec<Rgb>)>,
 }
 
 /// One row of a plugin table: a `type`, what it is, what it takes and how it is made.
@@ -70,6 +78,8 @@ pub struct Loader {
     bitmaps: HashMap<PathBuf, Arc<texture::Texels>>,
     meshes: HashMap<PathBuf, Arc<Vec<u8>>>,
     nesting: usize,
+    /// Textures that need to know all shapes.
+    pub attributes: Vec<texture::Unbound>,
 }
 
 /// Loads a scene file with everything it refers to.
@@ -85,24 +95,18 @@ pub fn load(path: &Path, options: &Options) -> Result<Scene> {
         bitmaps: HashMap::new(),
         meshes: HashMap::new(),
         nesting: 0,
+        attributes: Vec::new(),
     };
-    let mut instances = Vec::new();
-    let mut emitters: Vec<(Box<dyn Emitter>, bool)> = Vec::new();
+    let mut contents = Contents::default();
     let (mut sensor, mut integrator) = (None, None);
     for object in &objects {
         match object.class.as_str() {
-            "shape" => loader.shape(object, &mut instances, &mut emitters)?,
-            "emitter" => {
-                let plugin = find(emitter::PLUGINS, object)?;
-                let emitter = (plugin.make)(object, &mut loader)?;
-                object.all_used(plugin.parameters)?;
-                emitters.push((emitter, true));
-            }
-            "sensor" if sensor.is_some() => {
-                return Err(object.place.unsupported("a second sensor; a scene has one"));
-            }
+            "shape" => contents.shape(object, &mut loader)?,
+            "emitter" => contents.emitter(object, &mut loader)?,
+            // Of several cameras the first one renders.
+            "sensor" if sensor.is_some() => {}
             "sensor" => sensor = Some(sensor::load(object, &mut loader, options.size, MAX_PIXELS)?),
-            "integrator" => integrator = Some(integrator_settings(object)?),
+            "integrator" => integrator = Some(integrator::load(object, &loader)?),
             // Named materials that no shape uses are allowed, and need not even be understood.
             "bsdf" | "texture" => {}
             other => {
@@ -113,29 +117,18 @@ pub fn load(path: &Path, options: &Options) -> Result<Scene> {
     }
     let place = Place::file(path);
     let sensor = sensor.ok_or_else(|| place.invalid("the scene has no sensor"))?;
-    let parts = Parts { instances, emitters, sensor, integrator: integrator.unwrap_or_default(), fingerprint };
+    let Contents { shapes, groups, emitters } = contents;
+    let integrator = integrator.unwrap_or_default();
+    let groups = groups.into_values();
+    for attribute in loader.attributes {
+        let grouped = groups.iter().flat_map(|group| &group.shapes);
+        attribute.bind(shapes.iter().chain(grouped).map(|shape| &shape.geometry))?;
+    }
+    let parts = Parts { shapes, groups, emitters, sensor, integrator, fingerprint };
     Scene::build(parts, options.threads).map_err(|error| match error {
         Error::Usage(what) => place.invalid(what),
         other => other,
     })
-}
-
-fn integrator_settings(object: &Object) -> Result<Integrator> {
-    if object.plugin != "path" {
-        let what = format!("integrator `{}`; every scene is path traced, so use `path`", object.plugin);
-        return Err(object.place.unsupported(what));
-    }
-    let defaults = Integrator::default();
-    let depth = object.integer("max_depth", -1)?;
-    let max_depth = if depth < 0 { u32::MAX } else { u32::try_from(depth).unwrap_or(u32::MAX) };
-    let rr_depth = object.integer("rr_depth", i64::from(defaults.rr_depth))?;
-    let rr_depth = u32::try_from(rr_depth).ok().filter(|&depth| depth > 0);
-    let rr_depth = rr_depth.ok_or_else(|| object.place_of("rr_depth").invalid("`rr_depth` must be at least 1"))?;
-    if object.boolean("hide_emitters", false)? {
-        return Err(object.place_of("hide_emitters").unsupported("`hide_emitters`; emitters are always visible"));
-    }
-    object.all_used("max_depth, rr_depth, hide_emitters (false)")?;
-    Ok(Integrator { max_depth, rr_depth })
 }
 
 /// The table's row for an object, or an error that lists the table.
@@ -148,48 +141,6 @@ pub fn find<'a, T>(table: &'a [Plugin<T>], object: &Object) -> Result<&'a Plugin
 }
 
 impl Loader {
-    fn shape(
-        &mut self,
-        object: &Object,
-        instances: &mut Vec<Instance>,
-        emitters: &mut Vec<(Box<dyn Emitter>, bool)>,
-    ) -> Result<()> {
-        let plugin = find(shape::PLUGINS, object)?;
-        let geometry = Arc::new((plugin.make)(object, self)?);
-        let mut bsdf = None;
-        let mut emitter = None;
-        for property in object.nested() {
-            let nested = self.resolve(property)?;
-            property.take();
-            match nested.class.as_str() {
-                "bsdf" if bsdf.is_some() => return Err(nested.place.invalid("a second bsdf; a shape has one")),
-                "bsdf" => bsdf = Some(self.bsdf(&nested)?),
-                "emitter" if nested.plugin == "area" => {
-                    let radiance = self.radiance(&nested, "radiance")?;
-                    nested.all_used("radiance")?;
-                    emitter = Some(radiance);
-                }
-                other => {
-                    let what = format!("{other} `{}` in a shape; it takes a bsdf and an area emitter", nested.plugin);
-                    return Err(nested.place.unsupported(what));
-                }
-            }
-        }
-        object.all_used(plugin.parameters)?;
-        // A shape without area (degenerate triangles only) is invisible, and as an emitter it emits nothing.
-        if geometry.area() <= 0.0 {
-            return Ok(());
-        }
-        let bsdf = bsdf.unwrap_or_else(|| bsdf::default());
-        let emitter = emitter.map(|radiance| {
-            let area = emitter::Area::new(Arc::clone(&geometry), radiance, instances.len() as u32);
-            emitters.push((Box::new(area), false));
-            emitters.len() as u32 - 1
-        });
-        instances.push(Instance { geometry, bsdf, emitter });
-        Ok(())
-    }
-
     /// The object a property holds or refers to.
     pub fn resolve(&self, property: &Property) -> Result<Rc<Object>> {
         match &property.value {
@@ -246,6 +197,19 @@ impl Loader {
         }
     }
 
+    /// The one texture nested in an object, whatever its name.
+    pub fn nested_texture(&mut self, object: &Object) -> Result<Arc<dyn Texture>> {
+        let mut found = None;
+        for property in object.nested() {
+            let nested = self.resolve(property)?;
+            if nested.class == "texture" && found.is_none() {
+                property.take();
+                found = Some(self.texture_object(&nested)?);
+            }
+        }
+        found.ok_or_else(|| object.place.invalid(format!("`{}` needs a nested texture", object.plugin)))
+    }
+
     /// The property `name` as a texture: a colour, a number, or a nested texture.
     pub fn texture(&mut self, object: &Object, name: &str, default: Rgb) -> Result<Arc<dyn Texture>> {
         match object.get(name) {
@@ -257,14 +221,21 @@ impl Loader {
         }
     }
 
-    /// The property `name` as emitted light, white when absent. A uniform spectrum emits equal power at every
-    /// wavelength, which is not white in linear sRGB.
+    /// The property `name` as emitted light, white when absent.
     pub fn radiance(&mut self, object: &Object, name: &str) -> Result<Arc<dyn Texture>> {
-        const EQUAL_ENERGY: Rgb = vec3(1.204_794, 0.948_291, 0.908_916);
-        if let Some(&Property { value: Value::Spectrum(value), .. }) = object.get(name) {
-            return Ok(Arc::new(texture::Constant(EQUAL_ENERGY * value)));
+        match object.get(name) {
+            Some(Property { value: Value::Object(_) | Value::Reference(_), .. }) => {
+                self.texture(object, name, Rgb::ONE)
+            }
+            _ => Ok(Arc::new(texture::Constant(object.emission(name, Rgb::ONE)?))),
         }
-        self.texture(object, name, Rgb::ONE)
+    }
+
+    /// The same where it has to be a single colour.
+    pub fn uniform_radiance(&mut self, object: &Object, name: &str) -> Result<Rgb> {
+        let radiance = self.radiance(object, name)?;
+        let what = format!("a texture as the `{name}` of `{}`; it is one colour", object.plugin);
+        radiance.constant().ok_or_else(|| object.place_of(name).unsupported(what))
     }
 
     /// Builds a texture, or gives the one already built from this object.

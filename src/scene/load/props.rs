@@ -3,6 +3,7 @@
 use std::cell::Cell;
 use std::rc::Rc;
 
+use super::spectrum::Spectrum;
 use crate::error::{Error, Place, Result};
 use crate::math::{Mat4, Rgb, Vec3};
 
@@ -21,8 +22,8 @@ pub enum Value {
     Vector(Vec3),
     /// `<rgb>`.
     Color(Rgb),
-    /// A uniform `<spectrum>`.
-    Spectrum(f32),
+    /// `<spectrum>`.
+    Spectrum(Spectrum),
     /// `<transform>`.
     Transform(Mat4),
     /// `<ref>` to an object by its id.
@@ -134,9 +135,18 @@ impl Object {
             Some(property) => match property.value {
                 Value::Color(color) => Ok(color),
                 Value::Float(value) => Ok(Rgb::splat(value as f32)),
-                Value::Spectrum(value) => Ok(Rgb::splat(value)),
+                Value::Integer(value) => Ok(Rgb::splat(value as f32)),
+                Value::Spectrum(ref spectrum) => Ok(spectrum.reflectance()),
                 _ => Err(property.mistyped("a colour (<rgb>)")),
             },
+        }
+    }
+
+    /// A linear colour of light.
+    pub fn emission(&self, name: &str, default: Rgb) -> Result<Rgb> {
+        match self.get(name) {
+            Some(Property { value: Value::Spectrum(spectrum), .. }) => Ok(spectrum.emission()),
+            _ => self.color(name, default),
         }
     }
 

@@ -8,9 +8,10 @@ use std::rc::Rc;
 use roxmltree::{Document, Node};
 
 use super::props::{Object, Property, Value};
-use super::transform;
+use super::spectrum::Spectrum;
+use super::{legacy, transform};
 use crate::error::{Error, Place, Result};
-use crate::math::{Rgb, Vec3, vec3};
+use crate::math::{Rgb, Vec3, srgb_decode, vec3};
 
 /// Includes nested deeper than this are taken for a loop.
 const MAX_INCLUDES: usize = 15;
@@ -38,7 +39,7 @@ pub fn parse(path: &Path, parameters: &[(String, String)]) -> Result<Tree> {
     let folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
     let tree = Tree { objects: Vec::new(), ids: HashMap::new(), folders: vec![folder], sources: Vec::new() };
     let defaults = parameters.iter().cloned().collect();
-    let mut parser = Parser { tree, defaults, aliases: Vec::new(), includes: Vec::new(), depth: 0 };
+    let mut parser = Parser { tree, defaults, aliases: Vec::new(), includes: Vec::new(), depth: 0, legacy: false };
     parser.file(path)?;
     for (id, alias, place) in std::mem::take(&mut parser.aliases) {
         let object = parser.tree.ids.get(&id).cloned();
@@ -54,6 +55,8 @@ struct Parser {
     aliases: Vec<(String, String, Place)>,
     includes: Vec<PathBuf>,
     depth: usize,
+    /// Whether the file that is being read has the names of version 0.6 and before.
+    legacy: bool,
 }
 
 /// A node with what is needed to speak of its place.
@@ -87,15 +90,23 @@ impl Parser {
             return Err(root.place().invalid(format!("a scene file starts with <scene>, not <{}>", root.tag())));
         }
         let version = root.node.attribute("version").unwrap_or("3.0.0");
-        if !version.starts_with('3') && !version.starts_with('2') {
-            let what = format!("scene version {version}; versions 2 and 3 are supported");
+        let outer = std::mem::replace(&mut self.legacy, version.starts_with('0'));
+        if !version.starts_with(['0', '2', '3']) {
+            let what = format!("scene version {version}; versions 0.x, 2 and 3 are supported");
             return Err(root.place().unsupported(what));
         }
         for at in root.children() {
             self.top_level(at)?;
         }
         self.tree.sources.push(text.clone());
+        self.legacy = outer;
         Ok(())
+    }
+
+    fn spectrum_file(&self, name: &str, place: &Place) -> Result<Spectrum> {
+        let path = self.find(name).ok_or_else(|| place.invalid(format!("no file `{name}`")))?;
+        let text = std::fs::read_to_string(&path).map_err(|error| Error::io(&path, error))?;
+        Spectrum::parse_file(&text, &Place::file(&path))
     }
 
     fn top_level(&mut self, at: At) -> Result<()> {
@@ -176,6 +187,7 @@ impl Parser {
 
     fn property(&mut self, at: At) -> Result<Property> {
         let name = self.optional(at, "name")?.unwrap_or_default();
+        let name = if self.legacy { legacy::snake_case(&name) } else { name };
         Ok(Property::new(name, self.value(at)?, at.place()))
     }
 
@@ -196,13 +208,15 @@ impl Parser {
             },
             "string" => Value::String(text(self)?),
             "rgb" => Value::Color(rgb(&text(self)?, &place)?),
+            "srgb" => Value::Color(srgb(&text(self)?, &place)?),
             "spectrum" => {
-                let text = text(self)?;
-                if text.contains(':') {
-                    let what = "spectra given as curves; give linear RGB with <rgb> instead";
-                    return Err(place.unsupported(format!("`spectrum` {what}")));
+                if at.node.has_attribute("type") {
+                    return Ok(Value::Object(self.object(at)?));
                 }
-                Value::Spectrum(number(&text, &place)? as f32)
+                Value::Spectrum(match self.optional(at, "filename")? {
+                    Some(name) => self.spectrum_file(&name, &place)?,
+                    None => Spectrum::parse(&text(self)?, &place)?,
+                })
             }
             "point" | "vector" => Value::Vector(self.vector(at, 0.0)?),
             "transform" => Value::Transform(self.transform(at)?),
@@ -222,6 +236,9 @@ impl Parser {
             properties.push(self.property(child)?);
         }
         self.depth -= 1;
+        if self.legacy {
+            legacy::rename(&plugin, &mut properties);
+        }
         let id = self.optional(at, "id")?;
         let object = Rc::new(Object { class: at.tag().to_owned(), plugin, place: at.place(), properties });
         if let Some(id) = id {
@@ -263,7 +280,7 @@ impl Parser {
                     let angle = number(&self.attribute(child, "angle")?, &place)?;
                     transform::rotate(self.vector(child, 0.0)?, angle, &place)?
                 }
-                "lookat" => {
+                "lookat" | "lookAt" | "look_at" => {
                     let [origin, target] = ["origin", "target"].map(|name| self.attribute(child, name));
                     let up = self.optional(child, "up")?;
                     let up = up.map_or(Ok(Vec3::ZERO), |text| triple(&text, &place))?;
@@ -308,4 +325,16 @@ fn rgb(text: &str, place: &Place) -> Result<Rgb> {
         1 => Ok(Rgb::splat(number(text, place)? as f32)),
         _ => triple(text, place),
     }
+}
+
+/// A display colour: `#rrggbb`, or one or three numbers.
+fn srgb(text: &str, place: &Place) -> Result<Rgb> {
+    let encoded = match text.trim().strip_prefix('#') {
+        Some(hex) if hex.len() == 6 => {
+            let bits = u32::from_str_radix(hex, 16).map_err(|_| place.invalid(format!("`{text}` is not #rrggbb")))?;
+            vec3((bits >> 16) as f32, (bits >> 8 & 255) as f32, (bits & 255) as f32) / 255.0
+        }
+        _ => rgb(text, place)?,
+    };
+    Ok(Rgb::from_array(encoded.to_array().map(srgb_decode)))
 }

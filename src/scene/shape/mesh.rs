@@ -5,10 +5,10 @@ use std::sync::Arc;
 use super::Bounds;
 use crate::ffi::embree::{Hit, PaddedVertices};
 use crate::math::discrete::Discrete;
-use crate::math::{Frame, Mat4, Vec2, Vec3, vec2, warp};
+use crate::math::{Frame, Mat4, Rgb, Vec2, Vec3, vec2, warp};
 use crate::scene::emitter::{LightPoint, Position};
 use crate::scene::load::MeshData;
-use crate::scene::{Ray, Surface};
+use crate::scene::{Ray, Surface, texture};
 
 /// Triangles with optional normals and texture coordinates, shared with Embree.
 pub struct Mesh {
@@ -20,6 +20,8 @@ pub struct Mesh {
     normals: Vec<Vec3>,
     /// Texture coordinates, or none for barycentric ones.
     uvs: Vec<Vec2>,
+    /// Values by name: one a vertex under `vertex_...`, one a triangle under `face_...`.
+    attributes: Vec<(String, Vec<Rgb>)>,
     /// -1 to turn the surface inside out.
     side: f32,
     /// Triangles by area.
@@ -44,8 +46,13 @@ impl Mesh {
     pub fn new(data: MeshData, placement: Placement) -> Self {
         let Placement { to_world, face_normals, flip_normals } = placement;
         let positions: Vec<Vec3> = data.positions.iter().map(|&p| to_world.transform_point3(p)).collect();
-        let mut triangles = data.triangles;
-        triangles.retain(|triangle| triangle.iter().all(|&i| positions[i as usize].is_finite()));
+        let (mut triangles, mut attributes) = (data.triangles, data.attributes);
+        let keep: Vec<bool> = triangles.iter().map(|t| t.iter().all(|&i| positions[i as usize].is_finite())).collect();
+        if keep.contains(&false) {
+            retain(&mut triangles, &keep);
+            let of_faces = attributes.iter_mut().filter(|(name, _)| name.starts_with(FACE));
+            of_faces.for_each(|(_, values)| retain(values, &keep));
+        }
         let normals = if face_normals {
             Vec::new()
         } else if data.normals.is_empty() {
@@ -65,6 +72,7 @@ impl Mesh {
             triangles: Arc::new(triangles),
             normals,
             uvs: data.uvs,
+            attributes,
             side: if flip_normals { -1.0 } else { 1.0 },
             areas,
             bounds,
@@ -89,6 +97,11 @@ impl Mesh {
             }
             None => (flat, flat),
         }
+    }
+
+    fn texture_point(&self, primitive: u32, weights: [f32; 3]) -> texture::Point {
+        let uv = self.uv_at(self.triangles[primitive as usize], weights);
+        texture::Point { uv, barycentric: vec2(weights[1], weights[2]), primitive, shape: 0 }
     }
 
     fn uv_at(&self, triangle: [u32; 3], weights: [f32; 3]) -> Vec2 {
@@ -117,12 +130,11 @@ impl Mesh {
             p,
             n,
             frame,
-            uv: self.uv_at(triangle, weights),
+            at: self.texture_point(hit.primitive, weights),
             dp_du,
             dp_dv,
             epsilon: 0.0,
             wi: frame.to_local(-ray.direction),
-            instance: 0,
         }
     }
 
@@ -137,6 +149,21 @@ impl Mesh {
         }
         let frame = Frame::around(n);
         (frame.s, frame.t)
+    }
+
+    /// Number of the attribute of this name.
+    pub fn attribute(&self, name: &str) -> Option<usize> {
+        self.attributes.iter().position(|(known, _)| known == name)
+    }
+
+    /// Value of an attribute at a point, between the vertices as positions are.
+    pub fn attribute_at(&self, attribute: usize, at: &texture::Point) -> Rgb {
+        let (name, values) = &self.attributes[attribute];
+        if name.starts_with(FACE) {
+            return values[at.primitive as usize];
+        }
+        let [a, b, c] = self.triangles[at.primitive as usize].map(|index| values[index as usize]);
+        a + (b - a) * at.barycentric.x + (c - a) * at.barycentric.y
     }
 
     /// Total area.
@@ -159,13 +186,21 @@ impl Mesh {
         let p = corners[0] * weights[0] + corners[1] * weights[1] + corners[2] * weights[2];
         let (n, _) = self.normals_at(triangle, corners, weights);
         let position = Position::Surface { p, n };
-        Some(LightPoint { position, uv: self.uv_at(triangle, weights), emitter: 0 })
+        Some(LightPoint::drawn(position, self.texture_point(index as u32, weights)))
     }
 
     /// Density of [`Mesh::sample`] per solid angle at `from`.
     pub fn pdf(&self, from: Vec3, point: &LightPoint) -> f32 {
         point.area_to_solid_angle(from, 1.0 / self.area())
     }
+}
+
+/// How the names of attributes of faces start.
+const FACE: &str = "face_";
+
+fn retain<T>(values: &mut Vec<T>, keep: &[bool]) {
+    let mut kept = keep.iter();
+    values.retain(|_| kept.next().copied().unwrap_or_default());
 }
 
 fn angle_weighted_normals(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<Vec3> {

@@ -1,22 +1,34 @@
 //! Shapes: triangle meshes and spheres, and the plugins that make them.
 
 mod cube;
+pub mod cylinder;
+pub mod disk;
 mod files;
 pub mod mesh;
 mod rectangle;
 pub mod sphere;
 
+pub use self::cylinder::Cylinder;
+pub use self::disk::Disk;
 pub use self::mesh::Mesh;
 pub use self::sphere::Sphere;
 use super::emitter::LightPoint;
 use super::load::Plugin;
 use super::{Ray, Surface};
-use crate::ffi::embree::Hit;
-use crate::math::{Vec2, Vec3};
+use crate::ffi::embree::{Hit, Quadric, QuadricKind};
+use crate::math::{Mat4, Vec2, Vec3};
 
 /// The shapes of scene files.
-pub const PLUGINS: &[Plugin<Geometry>] =
-    &[files::OBJ, files::PLY, files::SERIALIZED, rectangle::PLUGIN, cube::PLUGIN, sphere::PLUGIN];
+pub const PLUGINS: &[Plugin<Geometry>] = &[
+    files::OBJ,
+    files::PLY,
+    files::SERIALIZED,
+    rectangle::PLUGIN,
+    cube::PLUGIN,
+    sphere::PLUGIN,
+    disk::PLUGIN,
+    cylinder::PLUGIN,
+];
 
 /// An axis-aligned box.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,6 +53,18 @@ impl Bounds {
         Self { lower: self.lower.min(other.lower), upper: self.upper.max(other.upper) }
     }
 
+    /// The box around this one after a transform.
+    pub fn transformed(self, matrix: Mat4) -> Self {
+        if self.is_empty() {
+            return self;
+        }
+        let corner = |i: u32| {
+            let pick = |axis: usize| if i >> axis & 1 == 0 { self.lower[axis] } else { self.upper[axis] };
+            matrix.transform_point3(Vec3::new(pick(0), pick(1), pick(2)))
+        };
+        Self::of((0..8).map(corner))
+    }
+
     /// Whether there is nothing in it.
     pub fn is_empty(self) -> bool {
         self.lower.cmpgt(self.upper).any()
@@ -61,12 +85,16 @@ impl Bounds {
     }
 }
 
-/// The two kinds of surface that are traced.
+/// The kinds of surface that are traced.
 pub enum Geometry {
     /// Triangles.
     Mesh(Mesh),
     /// One sphere.
     Sphere(Sphere),
+    /// One disk.
+    Disk(Disk),
+    /// One cylinder without caps.
+    Cylinder(Cylinder),
 }
 
 impl Geometry {
@@ -76,6 +104,8 @@ impl Geometry {
         match self {
             Self::Mesh(mesh) => mesh.surface(hit, ray, derivatives),
             Self::Sphere(sphere) => sphere.surface(hit, ray, derivatives),
+            Self::Disk(disk) => disk.surface(hit, ray),
+            Self::Cylinder(cylinder) => cylinder.surface(hit, ray),
         }
     }
 
@@ -84,6 +114,8 @@ impl Geometry {
         match self {
             Self::Mesh(mesh) => mesh.area(),
             Self::Sphere(sphere) => sphere.area(),
+            Self::Disk(disk) => disk.area(),
+            Self::Cylinder(cylinder) => cylinder.area(),
         }
     }
 
@@ -92,6 +124,8 @@ impl Geometry {
         match self {
             Self::Mesh(mesh) => mesh.bounds(),
             Self::Sphere(sphere) => sphere.bounds(),
+            Self::Disk(disk) => disk.bounds(),
+            Self::Cylinder(cylinder) => cylinder.bounds(),
         }
     }
 
@@ -100,6 +134,8 @@ impl Geometry {
         match self {
             Self::Mesh(mesh) => mesh.sample(u),
             Self::Sphere(sphere) => sphere.sample(from, u),
+            Self::Disk(disk) => Some(disk.sample(u)),
+            Self::Cylinder(cylinder) => Some(cylinder.sample(u)),
         }
     }
 
@@ -108,6 +144,21 @@ impl Geometry {
         match self {
             Self::Mesh(mesh) => mesh.pdf(from, point),
             Self::Sphere(sphere) => sphere.pdf(from, point),
+            Self::Disk(disk) => point.area_to_solid_angle(from, 1.0 / disk.area()),
+            Self::Cylinder(cylinder) => point.area_to_solid_angle(from, 1.0 / cylinder.area()),
         }
     }
+}
+
+/// A quadric as Embree's side wants it.
+fn quadric(kind: QuadricKind, to_object: Mat4, bounds: Bounds) -> Quadric {
+    let columns = to_object.to_cols_array_2d();
+    let mut flat = [0.0; 12];
+    for (to, column) in flat.chunks_exact_mut(3).zip(columns) {
+        to.copy_from_slice(&column[..3]);
+    }
+    // A flat box would let rays along it slip past.
+    let margin = 1e-6 * (bounds.lower.abs().max(bounds.upper.abs()) + (bounds.upper - bounds.lower));
+    let (lower, upper) = ((bounds.lower - margin).to_array(), (bounds.upper + margin).to_array());
+    Quadric { kind, to_object: flat, lower, upper }
 }

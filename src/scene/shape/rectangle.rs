@@ -20,6 +20,7 @@ fn make(object: &Object, loader: &mut Loader) -> Result<Geometry> {
         normals: vec![Vec3::Z; 4],
         uvs: corners.iter().map(|&(x, y)| vec2(0.5 * x + 0.5, 0.5 * y + 0.5)).collect(),
         triangles: vec![[0, 1, 2], [0, 2, 3]],
+        ..MeshData::default()
     };
     loader.finite(object, Geometry::Mesh(Mesh::new(data, Placement { to_world, face_normals: false, flip_normals })))
 }

@@ -9,7 +9,7 @@ use crate::math::{Frame, Mat4, Vec2, Vec3, vec2, vec3, warp};
 use crate::scene::emitter::{LightPoint, Position};
 use crate::scene::load::props::Object;
 use crate::scene::load::{Loader, Plugin};
-use crate::scene::{Ray, Surface};
+use crate::scene::{Ray, Surface, texture};
 
 /// `sphere`: centre and radius, then `to_world`.
 pub const PLUGIN: Plugin<Geometry> =
@@ -69,12 +69,11 @@ impl Sphere {
             p: self.center + outward * self.radius,
             n,
             frame,
-            uv: self.uv(outward),
+            at: texture::Point { uv: self.uv(outward), ..texture::Point::default() },
             dp_du,
             dp_dv,
             epsilon: 0.0,
             wi: frame.to_local(-ray.direction),
-            instance: 0,
         }
     }
 
@@ -109,7 +108,7 @@ impl Sphere {
 
     fn point(&self, outward: Vec3) -> LightPoint {
         let position = Position::Surface { p: self.center + outward * self.radius, n: outward * self.side };
-        LightPoint { position, uv: self.uv(outward), emitter: 0 }
+        LightPoint::drawn(position, texture::Point { uv: self.uv(outward), ..texture::Point::default() })
     }
 
     /// A point uniform over the cone that `from` sees, or over the area from inside.

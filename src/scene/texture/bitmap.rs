@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::{Arc, OnceLock};
 
-use super::{Texture, UvTransform};
+use super::{Point, Texture, UvTransform};
 use crate::error::Result;
 use crate::image::io;
 use crate::math::{Rgb, Vec2, luminance, srgb_decode, vec2, vec3};
@@ -13,7 +13,8 @@ use crate::scene::load::{Loader, Plugin};
 /// `bitmap`. An alpha channel is not used.
 pub const PLUGIN: Plugin<Arc<dyn Texture>> = Plugin {
     name: "bitmap",
-    parameters: "filename, filter_type (bilinear, nearest), wrap_mode (repeat, mirror, clamp), raw, to_uv",
+    parameters: "filename, filter_type (bilinear, nearest), wrap_mode (repeat, mirror, clamp), raw, to_uv, \
+        format, accel (both ignored)",
     make,
 };
 
@@ -21,6 +22,8 @@ fn make(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Texture>> {
     let nearest = object.choice("filter_type", &["bilinear", "nearest"], 0)? == 1;
     let wrap =
         [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp][object.choice("wrap_mode", &["repeat", "mirror", "clamp"], 0)?];
+    // Files keep their own precision.
+    object.ignore(&["format", "accel"]);
     let raw = object.boolean("raw", false)?;
     let to_uv = UvTransform::load(object)?;
     let path = loader.file(object)?;
@@ -132,8 +135,8 @@ impl Bitmap {
         vec2(self.texels.width as f32, self.texels.height as f32)
     }
 
-    fn footprint(&self, uv: Vec2) -> Footprint {
-        let at = self.to_uv.apply(uv) * self.resolution() - 0.5;
+    fn footprint(&self, point: &Point) -> Footprint {
+        let at = self.to_uv.apply(point.uv) * self.resolution() - 0.5;
         let corner = at.floor();
         let (x, y) = (corner.x as i64, corner.y as i64);
         let texels = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(dx, dy)| self.fetch(x + dx, y + dy));
@@ -148,20 +151,20 @@ impl Bitmap {
 }
 
 impl Texture for Bitmap {
-    fn color(&self, uv: Vec2) -> Rgb {
+    fn color(&self, point: &Point) -> Rgb {
         if self.nearest {
-            let at = (self.to_uv.apply(uv) * self.resolution()).floor();
+            let at = (self.to_uv.apply(point.uv) * self.resolution()).floor();
             return self.fetch(at.x as i64, at.y as i64);
         }
-        let Footprint { texels: [a, b, c, d], fraction: f } = self.footprint(uv);
+        let Footprint { texels: [a, b, c, d], fraction: f } = self.footprint(point);
         a.lerp(b, f.x).lerp(c.lerp(d, f.x), f.y)
     }
 
-    fn gradient(&self, uv: Vec2) -> Vec2 {
+    fn gradient(&self, point: &Point) -> Vec2 {
         if self.nearest {
             return Vec2::ZERO;
         }
-        let Footprint { texels, fraction: f } = self.footprint(uv);
+        let Footprint { texels, fraction: f } = self.footprint(point);
         let [a, b, c, d] = texels.map(luminance);
         let (dx, dy) = ((1.0 - f.y) * (b - a) + f.y * (d - c), (1.0 - f.x) * (c - a) + f.x * (d - b));
         let per_texel = vec2(dx, dy);
@@ -191,10 +194,11 @@ mod tests {
         let texels = Arc::new(Texels { width: 4, height: 3, samples });
         let to_uv = UvTransform { u: vec2(1.0, 0.0), v: vec2(0.0, 1.0), origin: Vec2::ZERO };
         let bitmap = Bitmap { texels, nearest: false, wrap: Wrap::Repeat, raw: true, to_uv, mean: 0.0 };
-        assert!((bitmap.color(vec2(1.5 / 4.0, 2.5 / 3.0)).x - 81.0).abs() < 1e-4);
+        let at = |uv| Point { uv, ..Point::default() };
+        assert!((bitmap.color(&at(vec2(1.5 / 4.0, 2.5 / 3.0))).x - 81.0).abs() < 1e-4);
         let (uv, h) = (vec2(0.4, 0.55), 1e-3);
-        let slope = |d: Vec2| (bitmap.scalar(uv + d) - bitmap.scalar(uv - d)) / (2.0 * h);
+        let slope = |d: Vec2| (bitmap.scalar(&at(uv + d)) - bitmap.scalar(&at(uv - d))) / (2.0 * h);
         let expected = vec2(slope(vec2(h, 0.0)), slope(vec2(0.0, h)));
-        assert!((bitmap.gradient(uv) - expected).length() < 1e-2 * expected.length());
+        assert!((bitmap.gradient(&at(uv)) - expected).length() < 1e-2 * expected.length());
     }
 }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Texture, UvTransform};
+use super::{Point, Texture, UvTransform};
 use crate::error::Result;
 use crate::math::{Rgb, Vec2};
 use crate::scene::load::props::Object;
@@ -28,21 +28,21 @@ struct Checkerboard {
 
 impl Checkerboard {
     /// Which square a point is in: 0 for the one at the origin, 1 for its neighbours.
-    fn square(&self, uv: Vec2) -> usize {
-        let cell = self.to_uv.apply(uv);
+    fn square(&self, at: &Point) -> usize {
+        let cell = self.to_uv.apply(at.uv);
         let half = (cell - cell.floor()).cmpgt(Vec2::splat(0.5));
         usize::from(half.test(0) != half.test(1))
     }
 }
 
 impl Texture for Checkerboard {
-    fn color(&self, uv: Vec2) -> Rgb {
-        self.colors[self.square(uv)].color(uv)
+    fn color(&self, at: &Point) -> Rgb {
+        self.colors[self.square(at)].color(at)
     }
 
     /// Used as a number, the squares change places: so Mitsuba 3 has it, and the files of the field rely on it.
-    fn scalar(&self, uv: Vec2) -> f32 {
-        self.colors[1 - self.square(uv)].scalar(uv)
+    fn scalar(&self, at: &Point) -> f32 {
+        self.colors[1 - self.square(at)].scalar(at)
     }
 
     fn mean(&self) -> f32 {

@@ -2,8 +2,11 @@
 
 mod bitmap;
 mod checkerboard;
+mod mesh_attribute;
+mod uniform;
 
 pub use self::bitmap::Texels;
+pub use self::mesh_attribute::Unbound;
 use super::load::Plugin;
 use super::load::props::Object;
 use crate::error::Result;
@@ -11,20 +14,34 @@ use crate::math::{Mat4, Rgb, Vec2, luminance, vec2};
 use std::sync::Arc;
 
 /// The textures of scene files.
-pub const PLUGINS: &[Plugin<Arc<dyn Texture>>] = &[bitmap::PLUGIN, checkerboard::PLUGIN];
+pub const PLUGINS: &[Plugin<Arc<dyn Texture>>] =
+    &[bitmap::PLUGIN, checkerboard::PLUGIN, mesh_attribute::PLUGIN, uniform::UNIFORM, uniform::RAW];
+
+/// A point of a shape, as textures see it.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Point {
+    /// Texture coordinates.
+    pub uv: Vec2,
+    /// Weights of the triangle's second and third corner.
+    pub barycentric: Vec2,
+    /// Number of the triangle.
+    pub primitive: u32,
+    /// Number of the shape.
+    pub shape: u32,
+}
 
 /// A colour or a number over a surface.
 pub trait Texture: Send + Sync {
-    /// Linear colour at texture coordinates.
-    fn color(&self, uv: Vec2) -> Rgb;
+    /// Linear colour at a point.
+    fn color(&self, at: &Point) -> Rgb;
 
     /// The colour as one number: its luminance for images, its mean for constants.
-    fn scalar(&self, uv: Vec2) -> f32 {
-        luminance(self.color(uv))
+    fn scalar(&self, at: &Point) -> f32 {
+        luminance(self.color(at))
     }
 
     /// Change of [`Texture::scalar`] per u and per v.
-    fn gradient(&self, _uv: Vec2) -> Vec2 {
+    fn gradient(&self, _at: &Point) -> Vec2 {
         Vec2::ZERO
     }
 
@@ -41,11 +58,11 @@ pub trait Texture: Send + Sync {
 pub struct Constant(pub Rgb);
 
 impl Texture for Constant {
-    fn color(&self, _uv: Vec2) -> Rgb {
+    fn color(&self, _at: &Point) -> Rgb {
         self.0
     }
 
-    fn scalar(&self, _uv: Vec2) -> f32 {
+    fn scalar(&self, _at: &Point) -> f32 {
         self.0.element_sum() / 3.0
     }
 

@@ -110,7 +110,8 @@ impl<'a> Walk<'a> {
     /// Walks along the vertices that light reaches, with an offset that starts with `ray`.
     pub fn along(mut self, lit: &[Vertex], ray: Ray) -> Rgb {
         let start = Prefix { throughput: Rgb::ONE, ratio: 1.0 };
-        let mut states = States::from(self.scene.intersect(ray).map(|surface| State::Apart(start, surface)));
+        let mut states =
+            States::from(self.scene.intersect_from_camera(ray).map(|surface| State::Apart(start, surface)));
         for (k, vertex) in lit.iter().enumerate() {
             if let Some(light) = &vertex.light {
                 self.add_light(vertex, light, states.light);
@@ -174,10 +175,13 @@ impl<'a> Walk<'a> {
             }
             State::Joining(prefix, wi) => {
                 let moved = self.scene.bsdf(&vertex.surface).eval(&vertex.surface, wi, *wo);
-                self.add_pair(of, prefix.throughput * moved.value * *radiance, prefix.ratio * (pdf + moved.pdf));
+                let moved_pdf = if point.delta { 0.0 } else { moved.pdf };
+                self.add_pair(of, prefix.throughput * moved.value * *radiance, prefix.ratio * (pdf + moved_pdf));
             }
             State::Apart(prefix, surface) => {
-                let end = if self.is_diffuse(vertex.roughness) && self.is_diffuse_at(&surface) {
+                let both_diffuse = || self.is_diffuse(vertex.roughness) && self.is_diffuse_at(&surface);
+                // An emitter's only point is lit by nothing else, whatever the materials.
+                let end = if point.delta || both_diffuse() {
                     reconnect::to_light(self.scene, &vertex.surface, &surface, point)
                 } else {
                     half_vector::extend(self.scene, &vertex.surface, (*wo, Lobe::Smooth), &surface)

@@ -1,0 +1,246 @@
+#include "embree.h"
+
+#if FLUXION_EMBREE_MAJOR >= 4
+#include <embree4/rtcore.h>
+#else
+#include <embree3/rtcore.h>
+#endif
+
+#include <cmath>
+#include <limits>
+#include <new>
+
+namespace {
+
+/* Keeps the caller's function beside its user pointer, so that ours can have Embree's own signature. */
+struct Listener {
+  FluxionErrorFunction function;
+  void *user;
+};
+
+struct Device {
+  RTCDevice device;
+  Listener listener;
+};
+
+void forward_error(void *user, RTCError code, const char *message) {
+  const Listener *listener = static_cast<const Listener *>(user);
+  listener->function(listener->user, static_cast<int>(code), message ? message : "");
+}
+
+RTCDevice device_of(void *device) { return static_cast<Device *>(device)->device; }
+
+RTCScene scene_of(void *scene) { return static_cast<RTCScene>(scene); }
+
+uint32_t attach(void *scene, RTCGeometry geometry) {
+  rtcCommitGeometry(geometry);
+  const uint32_t id = rtcAttachGeometry(scene_of(scene), geometry);
+  rtcReleaseGeometry(geometry);
+  return id;
+}
+
+void quadric_bounds(const RTCBoundsFunctionArguments *args) {
+  const FluxionQuadric *self = static_cast<const FluxionQuadric *>(args->geometryUserPtr);
+  args->bounds_o->lower_x = self->lower[0];
+  args->bounds_o->lower_y = self->lower[1];
+  args->bounds_o->lower_z = self->lower[2];
+  args->bounds_o->upper_x = self->upper[0];
+  args->bounds_o->upper_y = self->upper[1];
+  args->bounds_o->upper_z = self->upper[2];
+}
+
+void to_object(const FluxionQuadric *self, const double v[3], double w, double result[3]) {
+  const float *m = self->to_object;
+  for (int i = 0; i < 3; ++i) result[i] = m[i] * v[0] + m[3 + i] * v[1] + m[6 + i] * v[2] + m[9 + i] * w;
+}
+
+/* The nearest meeting of a ray with a quadric between `near` and `far`, in units of the direction; `far` if there is
+ * none. Doubles: the roots of a distant cylinder cancel in floats. */
+double quadric_meet(const FluxionQuadric *self, const double origin[3], const double direction[3], double near,
+                           double far) {
+  double o[3], d[3];
+  to_object(self, origin, 1.0, o);
+  to_object(self, direction, 0.0, d);
+  if (self->kind == FLUXION_DISK) {
+    const double t = -o[2] / d[2], x = o[0] + d[0] * t, y = o[1] + d[1] * t;
+    return t > near && t < far && x * x + y * y <= 1.0 ? t : far;
+  }
+  const double a = d[0] * d[0] + d[1] * d[1], b = o[0] * d[0] + o[1] * d[1], c = o[0] * o[0] + o[1] * o[1] - 1.0;
+  const double discriminant = b * b - a * c;
+  if (!(a > 0.0 && discriminant >= 0.0)) return far;
+  const double q = -(b + std::copysign(std::sqrt(discriminant), b));
+  double roots[2] = {q / a, q != 0.0 ? c / q : q / a};
+  if (roots[0] > roots[1]) {
+    const double larger = roots[0];
+    roots[0] = roots[1];
+    roots[1] = larger;
+  }
+  for (int i = 0; i < 2; ++i) {
+    const double z = o[2] + d[2] * roots[i];
+    if (roots[i] > near && roots[i] < far && z >= 0.0 && z <= 1.0) return roots[i];
+  }
+  return far;
+}
+
+double quadric_meet_lane(const FluxionQuadric *self, RTCRayN *ray, unsigned n, unsigned i) {
+  const double origin[3] = {RTCRayN_org_x(ray, n, i), RTCRayN_org_y(ray, n, i), RTCRayN_org_z(ray, n, i)};
+  const double direction[3] = {RTCRayN_dir_x(ray, n, i), RTCRayN_dir_y(ray, n, i), RTCRayN_dir_z(ray, n, i)};
+  return quadric_meet(self, origin, direction, RTCRayN_tnear(ray, n, i), RTCRayN_tfar(ray, n, i));
+}
+
+void quadric_intersect(const RTCIntersectFunctionNArguments *args) {
+  RTCRayN *ray = RTCRayHitN_RayN(args->rayhit, args->N);
+  RTCHitN *hit = RTCRayHitN_HitN(args->rayhit, args->N);
+  for (unsigned i = 0; i < args->N; ++i) {
+    if (!args->valid[i]) continue;
+    const double t = quadric_meet_lane(static_cast<const FluxionQuadric *>(args->geometryUserPtr), ray, args->N, i);
+    if (!(t < RTCRayN_tfar(ray, args->N, i))) continue;
+    RTCRayN_tfar(ray, args->N, i) = (float)t;
+    RTCHitN_u(hit, args->N, i) = 0.0f;
+    RTCHitN_v(hit, args->N, i) = 0.0f;
+    RTCHitN_Ng_x(hit, args->N, i) = 0.0f;
+    RTCHitN_Ng_y(hit, args->N, i) = 0.0f;
+    RTCHitN_Ng_z(hit, args->N, i) = 0.0f;
+    RTCHitN_geomID(hit, args->N, i) = args->geomID;
+    RTCHitN_primID(hit, args->N, i) = args->primID;
+    RTCHitN_instID(hit, args->N, i, 0) = args->context->instID[0];
+  }
+}
+
+void quadric_occluded(const RTCOccludedFunctionNArguments *args) {
+  for (unsigned i = 0; i < args->N; ++i) {
+    if (!args->valid[i]) continue;
+    const double t = quadric_meet_lane(static_cast<const FluxionQuadric *>(args->geometryUserPtr), args->ray, args->N, i);
+    if (t < RTCRayN_tfar(args->ray, args->N, i)) RTCRayN_tfar(args->ray, args->N, i) = -std::numeric_limits<float>::infinity();
+  }
+}
+
+RTCRay to_rtc(const FluxionRay *ray) {
+  RTCRay r;
+  r.org_x = ray->origin[0];
+  r.org_y = ray->origin[1];
+  r.org_z = ray->origin[2];
+  r.tnear = ray->t_near;
+  r.dir_x = ray->direction[0];
+  r.dir_y = ray->direction[1];
+  r.dir_z = ray->direction[2];
+  r.time = 0.0f;
+  r.tfar = ray->t_far;
+  r.mask = 0xffffffffu;
+  r.id = 0;
+  r.flags = 0;
+  return r;
+}
+
+}  // namespace
+
+void *fluxion_device_new(const char *config, FluxionErrorFunction function, void *user) {
+  Device *self = new (std::nothrow) Device;
+  if (!self) return nullptr;
+  self->listener.function = function;
+  self->listener.user = user;
+  self->device = rtcNewDevice(config);
+  if (!self->device) {
+    function(user, (int)rtcGetDeviceError(nullptr), "no Embree device could be made");
+    delete self;
+    return NULL;
+  }
+  rtcSetDeviceErrorFunction(self->device, forward_error, &self->listener);
+  return self;
+}
+
+void fluxion_device_release(void *device) {
+  Device *self = static_cast<Device *>(device);
+  rtcReleaseDevice(self->device);
+  delete self;
+}
+
+int fluxion_embree_version(void *device) {
+  return (int)rtcGetDeviceProperty(device_of(device), RTC_DEVICE_PROPERTY_VERSION);
+}
+
+void *fluxion_scene_new(void *device) { return rtcNewScene(device_of(device)); }
+
+uint32_t fluxion_scene_add_triangles(void *device, void *scene, const float *vertices, size_t vertex_count,
+                                     const uint32_t *indices, size_t triangle_count) {
+  RTCGeometry geometry = rtcNewGeometry(device_of(device), RTC_GEOMETRY_TYPE_TRIANGLE);
+  rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, vertices, 0, 12, vertex_count);
+  rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, indices, 0, 12, triangle_count);
+  return attach(scene, geometry);
+}
+
+uint32_t fluxion_scene_add_spheres(void *device, void *scene, const float *spheres, size_t count) {
+  RTCGeometry geometry = rtcNewGeometry(device_of(device), RTC_GEOMETRY_TYPE_SPHERE_POINT);
+  rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT4, spheres, 0, 16, count);
+  return attach(scene, geometry);
+}
+
+uint32_t fluxion_scene_add_quadric(void *device, void *scene, const FluxionQuadric *quadric) {
+  RTCGeometry geometry = rtcNewGeometry(device_of(device), RTC_GEOMETRY_TYPE_USER);
+  rtcSetGeometryUserPrimitiveCount(geometry, 1);
+  rtcSetGeometryUserData(geometry, const_cast<FluxionQuadric *>(quadric));
+  rtcSetGeometryBoundsFunction(geometry, quadric_bounds, nullptr);
+  rtcSetGeometryIntersectFunction(geometry, quadric_intersect);
+  rtcSetGeometryOccludedFunction(geometry, quadric_occluded);
+  return attach(scene, geometry);
+}
+
+uint32_t fluxion_scene_add_instance(void *device, void *scene, void *child, const float to_world[16]) {
+  RTCGeometry geometry = rtcNewGeometry(device_of(device), RTC_GEOMETRY_TYPE_INSTANCE);
+  rtcSetGeometryInstancedScene(geometry, scene_of(child));
+  rtcSetGeometryTransform(geometry, 0, RTC_FORMAT_FLOAT4X4_COLUMN_MAJOR, to_world);
+  return attach(scene, geometry);
+}
+
+void fluxion_scene_commit(void *scene) { rtcCommitScene(scene_of(scene)); }
+
+void fluxion_scene_bounds(void *scene, float lower[3], float upper[3]) {
+  RTCBounds bounds;
+  rtcGetSceneBounds(scene_of(scene), &bounds);
+  lower[0] = bounds.lower_x;
+  lower[1] = bounds.lower_y;
+  lower[2] = bounds.lower_z;
+  upper[0] = bounds.upper_x;
+  upper[1] = bounds.upper_y;
+  upper[2] = bounds.upper_z;
+}
+
+void fluxion_scene_release(void *scene) { rtcReleaseScene(scene_of(scene)); }
+
+bool fluxion_intersect(void *scene, const FluxionRay *ray, FluxionHit *hit) {
+  RTCRayHit query;
+  query.ray = to_rtc(ray);
+  query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+  query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+#if FLUXION_EMBREE_MAJOR >= 4
+  rtcIntersect1(scene_of(scene), &query, nullptr);
+#else
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  rtcIntersect1(scene_of(scene), &context, &query);
+#endif
+  if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return false;
+  hit->t = query.ray.tfar;
+  hit->u = query.hit.u;
+  hit->v = query.hit.v;
+  hit->geometry = query.hit.geomID;
+  hit->primitive = query.hit.primID;
+  hit->instance = query.hit.instID[0];
+  hit->normal[0] = query.hit.Ng_x;
+  hit->normal[1] = query.hit.Ng_y;
+  hit->normal[2] = query.hit.Ng_z;
+  return true;
+}
+
+bool fluxion_occluded(void *scene, const FluxionRay *ray) {
+  RTCRay query = to_rtc(ray);
+#if FLUXION_EMBREE_MAJOR >= 4
+  rtcOccluded1(scene_of(scene), &query, nullptr);
+#else
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  rtcOccluded1(scene_of(scene), &context, &query);
+#endif
+  /* Embree marks an occluded ray with a far end of minus infinity. */
+  return query.tfar < 0.0f;
+}

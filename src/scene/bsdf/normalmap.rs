@@ -1,0 +1,35 @@
+//! Shading normals read from a texture.
+
+use std::sync::Arc;
+
+use super::Bsdf;
+use super::bent::{Bend, Bent};
+use crate::error::Result;
+use crate::math::{Rgb, Vec3, vec3};
+use crate::scene::Surface;
+use crate::scene::load::props::Object;
+use crate::scene::load::{Loader, Plugin};
+use crate::scene::texture::Texture;
+
+/// `normalmap`: red, green and blue in [0, 1] are the normal's x, y and z in [-1, 1]. Image files want `raw`.
+pub const PLUGIN: Plugin<Arc<dyn Bsdf>> = Plugin {
+    name: "normalmap",
+    parameters: "normalmap, flip_invalid_normals, use_shadowing_function, one nested bsdf",
+    make,
+};
+
+fn make(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Bsdf>> {
+    if object.get("normalmap").is_none() {
+        return Err(object.place.invalid("`normalmap` needs a texture `normalmap`"));
+    }
+    let normals = Normals(loader.texture(object, "normalmap", vec3(0.5, 0.5, 1.0))?);
+    Ok(Arc::new(Bent::load(object, loader, normals)?))
+}
+
+struct Normals(Arc<dyn Texture>);
+
+impl Bend for Normals {
+    fn normal(&self, surface: &Surface) -> Vec3 {
+        (2.0 * self.0.color(&surface.at) - Rgb::ONE).normalize_or(Vec3::Z)
+    }
+}

@@ -1,0 +1,47 @@
+//! Light from a single point, the same in all directions.
+
+use std::f32::consts::PI;
+
+use super::{Emitter, LightPoint, Position};
+use crate::error::Result;
+use crate::math::{Rgb, Vec2, Vec3};
+use crate::scene::load::props::Object;
+use crate::scene::load::{Loader, Plugin};
+
+/// `point`.
+pub const PLUGIN: Plugin<Box<dyn Emitter>> =
+    Plugin { name: "point", parameters: "position or to_world, intensity", make };
+
+fn make(object: &Object, loader: &mut Loader) -> Result<Box<dyn Emitter>> {
+    let origin = object.transform("to_world")?.transform_point3(Vec3::ZERO);
+    let position = object.vector("position", origin)?;
+    Ok(Box::new(Point { position, intensity: loader.uniform_radiance(object, "intensity")? }))
+}
+
+struct Point {
+    position: Vec3,
+    /// Power per solid angle.
+    intensity: Rgb,
+}
+
+impl Emitter for Point {
+    fn sample(&self, _from: Vec3, _u: Vec2) -> Option<LightPoint> {
+        Some(LightPoint::only(Position::Point { p: self.position }))
+    }
+
+    fn pdf(&self, from: Vec3, point: &LightPoint) -> f32 {
+        1.0 / point.solid_angle(from)
+    }
+
+    fn radiance(&self, _point: &LightPoint, _direction: Vec3) -> Rgb {
+        self.intensity
+    }
+
+    fn power(&self) -> f32 {
+        4.0 * PI * self.intensity.max_element().max(0.0)
+    }
+
+    fn name(&self) -> &'static str {
+        "point"
+    }
+}

@@ -1,0 +1,168 @@
+//! The shapes and emitters of a scene, as they are gathered.
+
+use std::rc::Rc;
+use std::sync::Arc;
+
+use super::props::Object;
+use super::{Loader, find};
+use crate::error::Result;
+use crate::math::Mat4;
+use crate::scene::emitter::{self, Emitter};
+use crate::scene::shape;
+use crate::scene::{Group, Shape, bsdf};
+
+/// What has been found so far.
+#[derive(Default)]
+pub struct Contents {
+    /// Shapes that stand by themselves.
+    pub shapes: Vec<Shape>,
+    /// Groups, with where they are placed.
+    pub groups: Groups,
+    /// Emitters, numbered as the shapes name them.
+    pub emitters: Vec<Box<dyn Emitter>>,
+}
+
+/// Shapes that are placed together, by the object that describes them.
+#[derive(Default)]
+pub struct Groups(Vec<(*const Object, Group)>);
+
+impl Groups {
+    /// The groups without their origin.
+    pub fn into_values(self) -> Vec<Group> {
+        self.0.into_iter().map(|(_, group)| group).collect()
+    }
+}
+
+/// Shapes that hold other shapes, for the list of plugins.
+pub const CONTAINERS: &[(&str, &str)] = &[
+    ("shapegroup", "nested shapes without emitters; drawn where an instance refers to it"),
+    ("instance", "to_world, one nested or referenced shapegroup"),
+    ("merge", "nested shapes"),
+];
+
+impl Contents {
+    /// Adds an emitter that stands by itself.
+    pub fn emitter(&mut self, object: &Object, loader: &mut Loader) -> Result<()> {
+        let plugin = find(emitter::PLUGINS, object)?;
+        let emitter = (plugin.make)(object, loader)?;
+        // How often an emitter is sampled is decided from its power.
+        object.ignore(&["sampling_weight"]);
+        object.all_used(plugin.parameters)?;
+        self.emitters.push(emitter);
+        Ok(())
+    }
+
+    /// Adds a shape, or the shapes it stands for.
+    pub fn shape(&mut self, object: &Rc<Object>, loader: &mut Loader) -> Result<()> {
+        match object.plugin.as_str() {
+            "instance" => self.instance(object, loader),
+            // Drawn by its instances only.
+            "shapegroup" => Ok(()),
+            "merge" => loader.guarded(object, |loader| {
+                children(object, loader)?.iter().try_for_each(|child| self.shape(child, loader))
+            }),
+            _ => {
+                let number = (self.shapes.len() as u32, self.emitters.len() as u32);
+                if let Some((shape, emitter)) = single(object, loader, number)? {
+                    self.shapes.push(shape);
+                    self.emitters.extend(emitter);
+                }
+                Ok(())
+            }
+        }
+    }
+
+    fn instance(&mut self, object: &Rc<Object>, loader: &mut Loader) -> Result<()> {
+        let to_world = object.transform("to_world")?;
+        let groups = children(object, loader)?;
+        let [group] = groups.as_slice() else {
+            return Err(object.place.invalid("an instance needs exactly one shapegroup"));
+        };
+        if group.plugin != "shapegroup" {
+            return Err(group.place.invalid(format!("an instance of `{}`; it takes a shapegroup", group.plugin)));
+        }
+        object.all_used("to_world, one shapegroup")?;
+        let place = self.group(group, loader)?;
+        place.push(to_world);
+        Ok(())
+    }
+
+    /// Where a group is placed; its shapes are made when it is first asked for.
+    fn group(&mut self, object: &Rc<Object>, loader: &mut Loader) -> Result<&mut Vec<Mat4>> {
+        let groups = &mut self.groups.0;
+        let found = groups.iter().position(|(origin, _)| *origin == Rc::as_ptr(object));
+        let index = match found {
+            Some(index) => index,
+            None => {
+                let mut shapes = Vec::new();
+                for child in children(object, loader)? {
+                    if ["instance", "shapegroup", "merge"].contains(&child.plugin.as_str()) {
+                        return Err(child.place.unsupported(format!("`{}` in a shapegroup", child.plugin)));
+                    }
+                    if let Some((shape, emitter)) = single(&child, loader, (0, 0))? {
+                        if emitter.is_some() {
+                            return Err(child.place.unsupported("an emitter in a shapegroup"));
+                        }
+                        shapes.push(shape);
+                    }
+                }
+                object.all_used("nested shapes")?;
+                groups.push((Rc::as_ptr(object), Group { shapes, placements: Vec::new() }));
+                groups.len() - 1
+            }
+        };
+        Ok(&mut groups[index].1.placements)
+    }
+}
+
+/// The shapes nested in an object.
+fn children(object: &Object, loader: &Loader) -> Result<Vec<Rc<Object>>> {
+    let mut found = Vec::new();
+    for property in object.nested() {
+        let nested = loader.resolve(property)?;
+        if nested.class != "shape" {
+            return Err(nested.place.unsupported(format!("a {} in a `{}`", nested.class, object.plugin)));
+        }
+        property.take();
+        found.push(nested);
+    }
+    Ok(found)
+}
+
+/// A shape and the emitter that it is, if it glows.
+type Lit = (Shape, Option<Box<dyn Emitter>>);
+
+/// A shape with its emitter, which will have the numbers given; none when it has no area.
+fn single(object: &Object, loader: &mut Loader, (shape_number, emitter_number): (u32, u32)) -> Result<Option<Lit>> {
+    let plugin = find(shape::PLUGINS, object)?;
+    let geometry = Arc::new((plugin.make)(object, loader)?);
+    let (mut bsdf, mut radiance) = (None, None);
+    for property in object.nested() {
+        let nested = loader.resolve(property)?;
+        property.take();
+        match nested.class.as_str() {
+            "bsdf" if bsdf.is_some() => return Err(nested.place.invalid("a second bsdf; a shape has one")),
+            "bsdf" => bsdf = Some(loader.bsdf(&nested)?),
+            "emitter" if nested.plugin == "area" => {
+                radiance = Some(loader.radiance(&nested, "radiance")?);
+                nested.ignore(&["sampling_weight"]);
+                nested.all_used("radiance")?;
+            }
+            other => {
+                let what = format!("{other} `{}` in a shape; it takes a bsdf and an area emitter", nested.plugin);
+                return Err(nested.place.unsupported(what));
+            }
+        }
+    }
+    object.all_used(plugin.parameters)?;
+    // A shape without area (degenerate triangles only) is invisible, and as an emitter it emits nothing.
+    if geometry.area() <= 0.0 {
+        return Ok(None);
+    }
+    let emitter = radiance.map(|radiance| {
+        let area = emitter::Area::new(Arc::clone(&geometry), radiance, shape_number);
+        Box::new(area) as Box<dyn Emitter>
+    });
+    let bsdf = bsdf.unwrap_or_else(bsdf::default);
+    Ok(Some((Shape { geometry, bsdf, emitter: emitter.as_ref().map(|_| emitter_number) }, emitter)))
+}

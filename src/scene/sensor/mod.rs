@@ -1,0 +1,183 @@
+//! Cameras: where the rays of a film position start and where they go.
+
+mod film;
+
+use self::film::Film;
+use crate::error::Result;
+use crate::math::{Mat4, Vec2, Vec3, vec2, warp};
+use crate::scene::Ray;
+use crate::scene::load::Loader;
+use crate::scene::load::props::Object;
+
+/// Looks along its local +z with +x to the left and +y up.
+#[derive(Clone, Debug)]
+pub struct Sensor {
+    /// Image width in pixels.
+    pub width: usize,
+    /// Image height in pixels.
+    pub height: usize,
+    /// Samples per pixel that the file suggests.
+    pub spp: u32,
+    film: Film,
+    to_world: Mat4,
+    /// Half the full film's extent, at distance one where the view widens.
+    half_extent: Vec2,
+    /// Shift of the image centre, as a share of the film.
+    principal_point: Vec2,
+    projection: Projection,
+    near: f32,
+    far: f32,
+}
+
+/// How a film position becomes a ray.
+#[derive(Clone, Copy, Debug)]
+enum Projection {
+    /// Through a point.
+    Pinhole,
+    /// Through a disk, sharp at a distance along z.
+    Lens { radius: f32, focus: f32 },
+    /// Along z everywhere.
+    Parallel,
+}
+
+const VIEW: &str = "fov, focal_length, fov_axis (x, y, diagonal, smaller, larger), to_world, near_clip, far_clip, \
+    principal_point_offset_x, principal_point_offset_y, film, sampler";
+const LENS: &str = "aperture_radius, focus_distance, fov, focal_length, fov_axis (x, y, diagonal, smaller, larger), \
+    to_world, near_clip, far_clip, principal_point_offset_x, principal_point_offset_y, film, sampler";
+
+/// Plugins and what they take.
+pub const PLUGINS: &[(&str, &str)] =
+    &[("perspective", VIEW), ("thinlens", LENS), ("orthographic", "to_world, near_clip, far_clip, film, sampler")];
+
+/// Builds the sensor; `size` overrides the film's.
+pub fn load(object: &Object, loader: &mut Loader, size: Option<(usize, usize)>, max_pixels: u64) -> Result<Sensor> {
+    let Some((_, parameters)) = PLUGINS.iter().find(|(name, _)| *name == object.plugin) else {
+        let names: Vec<_> = PLUGINS.iter().map(|(name, _)| *name).collect();
+        let what = format!("sensor `{}` is not known; there are {}", object.plugin, names.join(", "));
+        return Err(object.place.unsupported(what));
+    };
+    let (film, spp) = film_and_spp(object, loader)?;
+    let (width, height) = size.unwrap_or(film.size);
+    let pixels = (width as u64).saturating_mul(height as u64);
+    if pixels == 0 || pixels > max_pixels {
+        return Err(object.place.invalid(format!("a film of {width}x{height} pixels; it may have 1 to {max_pixels}")));
+    }
+    // The window's own shape, were it as large as the whole film.
+    let aspect = (width as f32 / film.extent.x) / (height as f32 / film.extent.y);
+    let (near, far) = (object.float("near_clip", 1e-2)?, object.float("far_clip", 1e4)?);
+    if !(near > 0.0 && far > near) {
+        return Err(object.place_of("near_clip").invalid(format!("clip planes at {near} and {far}")));
+    }
+    let projection = projection(object, far)?;
+    let half_width = if let Projection::Parallel = projection { 1.0 } else { half_width(object, aspect)? };
+    let sensor = Sensor {
+        width,
+        height,
+        spp,
+        film,
+        to_world: object.transform("to_world")?,
+        half_extent: vec2(half_width, half_width / aspect),
+        principal_point: vec2(
+            object.float("principal_point_offset_x", 0.0)?,
+            object.float("principal_point_offset_y", 0.0)?,
+        ),
+        projection,
+        near,
+        far,
+    };
+    // Files name shutter times and the focus of pinholes; neither has a meaning here.
+    object.ignore(&["focus_distance", "shutter_open", "shutter_close"]);
+    object.all_used(parameters)?;
+    Ok(sensor)
+}
+
+fn film_and_spp(object: &Object, loader: &Loader) -> Result<(Film, u32)> {
+    let (mut film, mut spp) = (Film::default(), 64);
+    for property in object.nested() {
+        let nested = loader.resolve(property)?;
+        property.take();
+        match nested.class.as_str() {
+            "film" => film = Film::load(&nested)?,
+            "sampler" => {
+                spp = nested.integer("sample_count", 64)?;
+                // Sample patterns are ours.
+                nested.ignore(&["seed", "jitter", "scramble", "dimension"]);
+                nested.all_used("sample_count, seed, jitter, scramble, dimension")?;
+            }
+            other => return Err(nested.place.unsupported(format!("a {other} in a sensor; it takes film and sampler"))),
+        }
+    }
+    let spp = u32::try_from(spp).ok().filter(|&spp| spp > 0);
+    Ok((film, spp.ok_or_else(|| object.place.invalid("`sample_count` must be at least 1"))?))
+}
+
+fn projection(object: &Object, far: f32) -> Result<Projection> {
+    match object.plugin.as_str() {
+        "orthographic" => Ok(Projection::Parallel),
+        "thinlens" => {
+            let (radius, focus) = (object.float("aperture_radius", 0.0)?, object.float("focus_distance", far)?);
+            if object.get("aperture_radius").is_none() || radius < 0.0 || focus <= 0.0 {
+                let what = "`thinlens` needs an `aperture_radius` and a positive `focus_distance`";
+                return Err(object.place_of("aperture_radius").invalid(what));
+            }
+            Ok(Projection::Lens { radius, focus })
+        }
+        _ => Ok(Projection::Pinhole),
+    }
+}
+
+/// Half the film's width at distance one.
+fn half_width(object: &Object, aspect: f32) -> Result<f32> {
+    let diagonal = (1.0 + 1.0 / (aspect * aspect)).sqrt();
+    let focal_length = object.string("focal_length", "")?;
+    if !focal_length.is_empty() {
+        let millimetres = focal_length.trim_end_matches("mm").trim().parse::<f32>().ok().filter(|&f| f > 0.0);
+        let place = object.place_of("focal_length");
+        let millimetres = millimetres.ok_or_else(|| place.invalid(format!("`{focal_length}` is not like 50mm")))?;
+        // The diagonal of 35 mm film is the film's diagonal.
+        return Ok(0.5 * 36f32.hypot(24.0) / millimetres / diagonal);
+    }
+    // Without either, a 50 mm lens.
+    let default = 2.0 * (0.5 * 36f32.hypot(24.0) / 50.0).atan().to_degrees();
+    let axes = ["x", "y", "diagonal", "smaller", "larger"];
+    let axis = object.choice("fov_axis", &axes, if object.get("fov").is_some() { 0 } else { 2 })?;
+    let fov = object.float("fov", default)?;
+    if !(fov > 0.0 && fov < 180.0) {
+        return Err(object
+            .place_of("fov")
+            .invalid(format!("a field of view of {fov} degrees; it must be in (0, 180)")));
+    }
+    let half = (0.5 * fov.to_radians()).tan();
+    Ok(match axes[axis] {
+        "y" => half * aspect,
+        "diagonal" => half / diagonal,
+        "smaller" if aspect > 1.0 => half * aspect,
+        "larger" if aspect < 1.0 => half * aspect,
+        _ => half,
+    })
+}
+
+impl Sensor {
+    /// The ray through a film position in pixels, (0, 0) being the upper left corner of the image, and through a
+    /// point of the lens in [0, 1)². It runs from the near to the far clip plane.
+    pub fn ray(&self, film: Vec2, lens: Vec2) -> Ray {
+        let at = self.film.place(film / vec2(self.width as f32, self.height as f32)) + self.principal_point;
+        let at = (Vec2::ONE - 2.0 * at) * self.half_extent;
+        let (origin, direction) = match self.projection {
+            Projection::Pinhole => (Vec3::ZERO, at.extend(1.0)),
+            Projection::Lens { radius, focus } => {
+                let origin = (radius * warp::disk(lens)).extend(0.0);
+                (origin, at.extend(1.0) * focus - origin)
+            }
+            Projection::Parallel => (at.extend(0.0), Vec3::Z),
+        };
+        let local = direction.normalize();
+        let origin = self.to_world.transform_point3(origin);
+        let along = self.to_world.transform_vector3(local);
+        // Planes are at depths along z; a scaled camera has its planes scaled.
+        let (scale, direction) = (along.length(), along.normalize());
+        let distance = |depth: f32| depth / local.z * scale;
+        let start = origin + direction * distance(self.near);
+        Ray { origin: start, direction, t_far: distance(self.far - self.near) }
+    }
+}

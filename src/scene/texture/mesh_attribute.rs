@@ -1,0 +1,71 @@
+//! Colours and numbers that a mesh has at its vertices or faces.
+
+use std::sync::{Arc, OnceLock};
+
+use super::{Point, Texture};
+use crate::error::{Place, Result};
+use crate::math::Rgb;
+use crate::scene::load::props::Object;
+use crate::scene::load::{Loader, Plugin};
+use crate::scene::shape::Geometry;
+
+/// `mesh_attribute`: `name` starts with `vertex_` or `face_`.
+pub const PLUGIN: Plugin<Arc<dyn Texture>> = Plugin { name: "mesh_attribute", parameters: "name, scale", make };
+
+fn make(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Texture>> {
+    let name = object.string("name", "")?;
+    if !name.starts_with("vertex_") && !name.starts_with("face_") {
+        return Err(object.place_of("name").invalid(format!("`{name}` is no `vertex_...` or `face_...` attribute")));
+    }
+    let scale = object.float("scale", 1.0)?;
+    let shapes = Arc::new(OnceLock::new());
+    loader.attributes.push(Unbound { name, place: object.place.clone(), shapes: Arc::clone(&shapes) });
+    Ok(Arc::new(MeshAttribute { shapes, scale }))
+}
+
+/// For every shape, its geometry and the number of the attribute there.
+type Shapes = Vec<Option<(Arc<Geometry>, usize)>>;
+
+/// An attribute that waits for all shapes to be known.
+pub struct Unbound {
+    name: String,
+    place: Place,
+    shapes: Arc<OnceLock<Shapes>>,
+}
+
+impl Unbound {
+    /// Looks the attribute up in every shape; one at least must have it.
+    pub fn bind<'a>(self, shapes: impl Iterator<Item = &'a Arc<Geometry>>) -> Result<()> {
+        let find = |geometry: &'a Arc<Geometry>| match &**geometry {
+            Geometry::Mesh(mesh) => Some((Arc::clone(geometry), mesh.attribute(&self.name)?)),
+            _ => None,
+        };
+        let found: Shapes = shapes.map(find).collect();
+        if found.iter().all(Option::is_none) {
+            return Err(self.place.invalid(format!("no mesh has the attribute `{}`", self.name)));
+        }
+        self.shapes.get_or_init(|| found);
+        Ok(())
+    }
+}
+
+struct MeshAttribute {
+    shapes: Arc<OnceLock<Shapes>>,
+    scale: f32,
+}
+
+impl Texture for MeshAttribute {
+    /// Black on shapes without the attribute.
+    fn color(&self, at: &Point) -> Rgb {
+        let found = self.shapes.get().and_then(|shapes| shapes.get(at.shape as usize)?.as_ref());
+        match found.map(|(geometry, attribute)| (&**geometry, *attribute)) {
+            Some((Geometry::Mesh(mesh), attribute)) => mesh.attribute_at(attribute, at) * self.scale,
+            _ => Rgb::ZERO,
+        }
+    }
+
+    /// Unknown before all shapes are; a middling guess.
+    fn mean(&self) -> f32 {
+        0.5
+    }
+}
