@@ -9,7 +9,7 @@ use std::path::Path;
 
 use fluxion::error::Error;
 use fluxion::image::{Image, io};
-use fluxion::math::{Vec3, rng, vec3};
+use fluxion::math::{Vec3, rng, srgb_decode, vec3};
 
 type Result = std::result::Result<(), Box<dyn std::error::Error>>;
 
@@ -17,12 +17,14 @@ fn main() -> Result {
     fs::create_dir_all("scenes/assets")?;
     tiles(Path::new("scenes/assets/tiles.png"))?;
     bumps(Path::new("scenes/assets/bumps.png"))?;
+    normals(Path::new("scenes/assets/normals.png"))?;
     leaf(Path::new("scenes/assets/holes.png"))?;
     sky(Path::new("scenes/assets/sky.exr"))?;
     let torus = Torus::new(48, 24, 0.3);
     torus.write_obj("scenes/assets/torus.obj")?;
     torus.write_ply("scenes/assets/torus.ply", false)?;
     torus.write_ply("scenes/assets/torus_binary.ply", true)?;
+    torus.write_colored_ply("scenes/assets/torus_colors.ply")?;
     torus.write_serialized("scenes/assets/torus.serialized")?;
     Ok(())
 }
@@ -56,6 +58,18 @@ fn tiles(path: &Path) -> std::result::Result<(), Error> {
 /// Heights of round bumps.
 fn bumps(path: &Path) -> std::result::Result<(), Error> {
     image(path, 128, |x, y| Vec3::splat(0.5 + 0.25 * ((x * 4.0 * TAU).sin() * (y * 4.0 * TAU).sin())))
+}
+
+/// The normals of round bumps, as numbers rather than colours.
+fn normals(path: &Path) -> std::result::Result<(), Error> {
+    image(path, 128, |x, y| {
+        let (sx, cx) = (x * 4.0 * TAU).sin_cos();
+        let (sy, cy) = (y * 4.0 * TAU).sin_cos();
+        let normal = vec3(-0.5 * cx * sy, -0.5 * sx * cy, 1.0).normalize();
+        let stored = 0.5 * normal + 0.5;
+        // The file's encoding for display is undone, so that what it holds are the numbers.
+        Vec3::from_array(stored.to_array().map(srgb_decode))
+    })
 }
 
 /// White with round holes.
@@ -148,6 +162,30 @@ impl Torus {
             } else {
                 writeln!(bytes, "3 {a} {b} {c}")?;
             }
+        }
+        Ok(fs::write(path, bytes)?)
+    }
+
+    /// With normals and a colour at every vertex.
+    fn write_colored_ply(&self, path: &str) -> Result {
+        let properties = ["x", "y", "z", "nx", "ny", "nz", "color_0", "color_1", "color_2"];
+        let properties = properties.map(|name| format!("property float {name}\n")).concat();
+        let mut bytes = format!(
+            "ply\nformat binary_little_endian 1.0\nelement vertex {}\n{properties}element face {}\n\
+             property list uchar int vertex_indices\nend_header\n",
+            self.positions.len(),
+            self.triangles.len()
+        )
+        .into_bytes();
+        for (p, (n, [u, v])) in self.positions.iter().zip(self.normals.iter().zip(&self.uvs)) {
+            let color = vec3(0.2 + 0.6 * (TAU * u).cos().abs(), 0.3, 0.2 + 0.6 * (TAU * v).sin().abs());
+            for value in [p, n, &color].into_iter().flat_map(|vector| vector.to_array()) {
+                bytes.extend(value.to_le_bytes());
+            }
+        }
+        for triangle in &self.triangles {
+            bytes.push(3);
+            triangle.iter().for_each(|index| bytes.extend((*index as i32).to_le_bytes()));
         }
         Ok(fs::write(path, bytes)?)
     }

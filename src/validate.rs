@@ -7,6 +7,7 @@ use crate::error::{Error, Result};
 use crate::film::{Frame, Layer, Needs};
 use crate::image::Image;
 use crate::image::io::{Kind, Pixels, read, write};
+use crate::render::gradient::shift::Shift;
 use crate::render::{Budget, Control, Settings, render};
 use crate::scene::{Scene, load};
 
@@ -34,7 +35,7 @@ pub struct Verdict {
 }
 
 fn path_traced(scene: &Scene, spp: u32, seed: u64) -> Frame {
-    let settings = Settings { budget: Budget::Spp(spp), seed, needs: Needs::default(), shift_threshold: 0.0 };
+    let settings = Settings { budget: Budget::Spp(spp), seed, needs: Needs::default(), shift: Shift::default() };
     let control = Control { stop: &AtomicBool::new(false), progress: &|_| {} };
     render(scene, settings, &control).film.develop()
 }

@@ -3,11 +3,11 @@
 
 mod common;
 
-use common::{ALL, bundled, film};
+use common::{ALL, bundled, film, shifted_film};
 use fluxion::film::{Layer, Needs};
 use fluxion::image::Image;
 use fluxion::math::{Vec3, rng, vec2, vec3};
-use fluxion::render::gradient::shift::{half_vector, reconnect};
+use fluxion::render::gradient::shift::{Shift, half_vector, reconnect};
 
 /// Independent pairs of a gradient render and a path-traced one.
 const RUNS: u64 = 16;
@@ -15,14 +15,14 @@ const RUNS: u64 = 16;
 /// In every run and for every edge, the sampled difference minus that of an independent path-traced image has mean
 /// zero. Over all edges the means must look like it: centred, spread as Student's t with 15 degrees of freedom, without
 /// a tail.
-fn check_unbiased(name: &str, spp: u32) {
+fn check_unbiased(name: &str, spp: u32, shift: Shift) {
     let size = (24, 18);
     let scene = bundled(name, size);
     for (layer, step) in [(Layer::Dx, (1, 0)), (Layer::Dy, (0, 1))] {
         let runs: Vec<Vec<f64>> = (0..RUNS)
             .map(|run| {
                 let edges = Needs { edges: true, ..Needs::default() };
-                let gradient = film(&scene, spp, 2 * run, edges).develop();
+                let gradient = shifted_film(&scene, spp, 2 * run, edges, shift).develop();
                 let image = film(&scene, 2 * spp, 2 * run + 1, Needs::default()).develop();
                 errors(gradient.get(layer).unwrap(), image.get(Layer::Color).unwrap(), step)
             })
@@ -66,26 +66,34 @@ fn errors(gradient: &Image, image: &Image, step: (usize, usize)) -> Vec<f64> {
 }
 
 macro_rules! unbiased {
-    ($($test:ident: $scene:literal, $spp:literal;)*) => {
-        $(#[test] fn $test() { check_unbiased($scene, $spp); })*
+    ($($test:ident: $scene:literal, $spp:literal, $shift:expr;)*) => {
+        $(#[test] fn $test() { check_unbiased($scene, $spp, $shift); })*
     };
 }
 
 unbiased! {
-    unbiased_between_diffuse_surfaces: "unit/diffuse", 64;
-    unbiased_on_rough_conductors: "unit/rough-conductor", 64;
-    unbiased_through_glass: "unit/dielectric", 64;
-    unbiased_under_an_environment: "unit/environment", 64;
-    unbiased_around_occluders: "unit/occluder", 64;
-    unbiased_on_plastic: "unit/plastic", 64;
-    unbiased_through_masks: "unit/mask", 64;
-    unbiased_on_rough_plastic: "unit/rough-plastic", 64;
-    unbiased_on_bumps: "unit/bump", 64;
-    unbiased_behind_a_pane: "unit/thin-pane", 64;
-    unbiased_under_sphere_lights: "unit/sphere-light", 64;
-    unbiased_between_mirrors: "unit/mirror-rooms", 64;
-    unbiased_in_a_closed_box: "cornell-box", 64;
-    unbiased_on_glossy_metals: "glossy-metal", 64;
+    unbiased_between_diffuse_surfaces: "unit/diffuse", 64, Shift::default();
+    unbiased_on_rough_conductors: "unit/rough-conductor", 64, Shift::default();
+    unbiased_through_glass: "unit/dielectric", 64, Shift::default();
+    unbiased_under_an_environment: "unit/environment", 64, Shift::default();
+    unbiased_around_occluders: "unit/occluder", 64, Shift::default();
+    unbiased_on_plastic: "unit/plastic", 64, Shift::default();
+    unbiased_through_masks: "unit/mask", 64, Shift::default();
+    unbiased_on_rough_plastic: "unit/rough-plastic", 64, Shift::default();
+    unbiased_on_bumps: "unit/bump", 64, Shift::default();
+    unbiased_behind_a_pane: "unit/thin-pane", 64, Shift::default();
+    unbiased_under_sphere_lights: "unit/sphere-light", 64, Shift::default();
+    unbiased_between_mirrors: "unit/mirror-rooms", 64, Shift::default();
+    unbiased_in_a_closed_box: "cornell-box", 64, Shift::default();
+    unbiased_on_glossy_metals: "glossy-metal", 64, Shift::default();
+    unbiased_through_a_lens_under_points_of_light: "unit/lens", 64, Shift::default();
+    unbiased_through_rough_glass: "unit/rough-glass", 64, Shift::default();
+    unbiased_where_rough_glass_is_refracted_about_half_vectors: "unit/rough-glass", 64, Shift::Reconnect { threshold: 0.5 };
+    unbiased_on_instances: "unit/instances", 64, Shift::default();
+    unbiased_on_principled_materials: "unit/principled", 64, Shift::default();
+    unbiased_on_bent_and_blended_materials: "unit/normal-map", 64, Shift::default();
+    unbiased_by_replay: "unit/occluder", 64, Shift::Replay;
+    unbiased_by_replay_through_glass: "unit/dielectric", 64, Shift::Replay;
 }
 
 #[test]
@@ -116,6 +124,20 @@ fn in_a_furnace_every_pixel_is_one_and_borders_are_like_the_inside() {
     // The last column and row have no edge.
     let (dx, dy) = (frame.get(Layer::Dx).unwrap(), frame.get(Layer::Dy).unwrap());
     assert!((0..13).all(|y| dx.pixel(20, y) == [0.0; 3]) && (0..21).all(|x| dy.pixel(x, 12) == [0.0; 3]));
+}
+
+#[test]
+fn replayed_paths_resemble_each_other_less_than_reconnected_ones_and_more_than_strangers() {
+    let scene = bundled("cornell-box", (64, 64));
+    let edges = Needs { edges: true, ..Needs::default() };
+    let ratio = |shift| {
+        let frame = shifted_film(&scene, 64, 1, edges, shift).develop();
+        let sum = |layer| frame.get(layer).unwrap().data.iter().map(|&v| f64::from(v)).sum::<f64>();
+        sum(Layer::DxVariance) / (2.0 * sum(Layer::ColorVariance))
+    };
+    let (replayed, reconnected) = (ratio(Shift::Replay), ratio(Shift::default()));
+    // Each end of an edge takes half of the difference: of strangers their sum would have half of both variances.
+    assert!(replayed < 0.3 * 0.5 && reconnected < replayed, "{replayed} {reconnected}");
 }
 
 #[test]
@@ -152,6 +174,25 @@ fn half_vector_copies_can_be_undone_and_their_jacobian_is_the_change_of_solid_an
             assert!((numeric / jacobian - 1.0).abs() < 0.05, "{numeric} {jacobian}");
         }
     }
+}
+
+#[test]
+fn half_vector_refractions_can_be_undone_and_their_jacobian_is_the_change_of_solid_angle() {
+    let mut possible = 0;
+    for i in 0..400 {
+        let eta = if i % 2 == 0 { 1.5 } else { 1.0 / 1.33 };
+        let (wi, wo, other_wi) = (direction(3 * i), -direction(3 * i + 1), direction(3 * i + 2));
+        let Some((other_wo, jacobian)) = half_vector::refract(wi, wo, other_wi, eta) else { continue };
+        let Some((back, inverse)) = half_vector::refract(other_wi, other_wo, wi, eta) else { continue };
+        possible += 1;
+        assert!(back.distance(wo) < 1e-3 && (jacobian * inverse - 1.0).abs() < 1e-2, "{wi} {wo} {other_wi}");
+        if (0.05..20.0).contains(&jacobian) {
+            let map = |wo| half_vector::refract(wi, wo, other_wi, eta).map_or(Vec3::ZERO, |(w, _)| w);
+            let numeric = numeric_jacobian(wo, map);
+            assert!((numeric / jacobian - 1.0).abs() < 0.05, "{numeric} {jacobian}");
+        }
+    }
+    assert!(possible > 50, "{possible}");
 }
 
 #[test]

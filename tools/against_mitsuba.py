@@ -145,7 +145,9 @@ def mitsuba_scene(mi, path, size):
         for old in film.findall("rfilter"):
             film.remove(old)
         ET.SubElement(film, "rfilter", type="box")
-        for key, value in zip(("width", "height"), size):
+        # A cropped film keeps the size of its window.
+        cropped = [e for e in film.findall("integer") if e.get("name").startswith("crop_")]
+        for key, value in [] if cropped else zip(("width", "height"), size):
             for old in [e for e in film.findall("integer") if e.get("name") == key]:
                 old.set("value", str(value))
     with tempfile.NamedTemporaryFile("wb", suffix=".xml", dir=".", delete=False) as file:
@@ -200,7 +202,7 @@ def bundled(spp="1024"):
     print("| scene | mean ratio R G B | standard error | z rms | beyond 4 |\n|---|---|---|---|---|")
     names = ["unit/" + n for n in sorted(os.listdir("scenes/unit")) if os.path.exists("scenes/unit/%s/scene.xml" % n)]
     for name in ["cornell-box", "door-ajar", "glossy-metal", "glass-caustic"] + names:
-        path, size = "scenes/%s/scene.xml" % name, (64, 48)
+        path, size = "scenes/%s/scene.xml" % name, (32, 24) if name == "unit/orthographic" else (64, 48)
         _, layers, _ = fluxion(path, size, int(spp), "primal")
         scene = mitsuba_scene(mi, path, size)
         runs = np.stack([np.array(mi.render(scene, spp=int(spp) // 8, seed=10 + s), dtype=np.float64)[..., :3] for s in range(8)])

@@ -13,6 +13,7 @@ use fluxion::image::io;
 use fluxion::plan::Plan;
 use fluxion::reconstruct::{self, Context, Solution};
 use fluxion::render::gradient::Tracer;
+use fluxion::render::gradient::shift::{SHIFTS, Shift};
 use fluxion::render::{self, Budget, Control, Outcome, SampleId, Settings};
 use fluxion::scene::{Scene, load};
 
@@ -61,9 +62,12 @@ pub struct Args {
     /// Value of a scene parameter, over its <default>
     #[arg(short = 'D', value_parser = super::parse_definition, value_name = "NAME=VALUE")]
     define: Vec<(String, String)>,
-    /// Roughness above which paths are reconnected through a material instead of half-vector copied
-    #[arg(long, default_value_t = 0.001, hide_short_help = true)]
-    shift_threshold: f32,
+    /// How paths are moved to neighbouring pixels: reconnect or replay
+    #[arg(long, default_value = SHIFTS[0].0, value_parser = SHIFTS.iter().map(|row| row.0).collect::<Vec<_>>(), hide_short_help = true)]
+    shift: String,
+    /// Roughness above which `reconnect` goes through a material instead of copying half vectors
+    #[arg(long, value_name = "ALPHA", hide_short_help = true)]
+    shift_threshold: Option<f32>,
     /// Show no progress
     #[arg(short, long)]
     quiet: bool,
@@ -134,6 +138,14 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
+fn shift(args: &Args) -> Shift {
+    let row = SHIFTS.iter().find(|(name, ..)| *name == args.shift);
+    match (row.map(|(_, shift, _)| *shift).unwrap_or_default(), args.shift_threshold) {
+        (Shift::Reconnect { .. }, Some(threshold)) => Shift::Reconnect { threshold },
+        (shift, _) => shift,
+    }
+}
+
 fn trace(args: &Args, scene: &Scene, needs: Needs) -> Result<Outcome> {
     let stop = Arc::new(AtomicBool::new(false));
     let handler = Arc::clone(&stop);
@@ -148,7 +160,7 @@ fn trace(args: &Args, scene: &Scene, needs: Needs) -> Result<Outcome> {
         Some(time) => Budget::Time(time),
         None => Budget::Spp(args.spp.unwrap_or(scene.sensor().spp)),
     };
-    let settings = Settings { budget, seed: args.seed, needs, shift_threshold: args.shift_threshold };
+    let settings = Settings { budget, seed: args.seed, needs, shift: shift(args) };
     let bar = progress::bar(args.quiet);
     bar.set_message("rendering");
     let report = |share| progress::set(&bar, share);
@@ -165,12 +177,13 @@ fn warn(args: &Args, outcome: &Outcome) {
         let (count, SampleId { x, y, index, seed }) = (outcome.film.rejected(), id);
         eprintln!("warning: {count} samples were not finite ({}) and count as zero; the first one again:", reason.0);
         let (width, height) = (outcome.film.width, outcome.film.height);
+        let threshold = args.shift_threshold.map_or(String::new(), |alpha| format!(" --shift-threshold {alpha}"));
         let definitions: String = args.define.iter().map(|(name, value)| format!(" -D '{name}={value}'")).collect();
-        let threshold = args.shift_threshold;
         eprintln!(
-            "  fluxion render {} --size {width}x{height} --seed {seed} --shift-threshold {threshold}{definitions} \
+            "  fluxion render {} --size {width}x{height} --seed {seed} --shift {}{threshold}{definitions} \
              --replay {x},{y},{index}",
-            args.scene.display()
+            args.scene.display(),
+            args.shift
         );
     }
 }
@@ -248,7 +261,7 @@ fn replay(args: &Args, scene: &Scene, (x, y, index): (usize, usize, u32)) -> Res
         bail!(Error::Usage(format!("pixel {x},{y} is outside the film of {}x{}", sensor.width, sensor.height)));
     }
     let id = SampleId { seed: args.seed, x, y, index };
-    let sample = render::sample(scene, id, Some(&mut Tracer::new(args.shift_threshold)));
+    let sample = render::sample(scene, id, Some(&mut Tracer::new(shift(args))));
     println!("{sample:#?}");
     Ok(ExitCode::SUCCESS)
 }

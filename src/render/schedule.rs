@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 use rayon::prelude::*;
 
 use super::gradient::Tracer;
+use super::gradient::shift::Shift;
 use super::{SampleId, sample};
 use crate::film::{Film, Needs, Rejected, Tile};
 use crate::scene::Scene;
@@ -29,8 +30,8 @@ pub struct Settings {
     pub seed: u64,
     /// What to record; edges make it gradient-domain path tracing.
     pub needs: Needs,
-    /// Smooth lobes rougher than this are reconnected through rather than half-vector copied.
-    pub shift_threshold: f32,
+    /// How differences to neighbours are sampled.
+    pub shift: Shift,
 }
 
 /// Threads between the caller and a render that is under way.
@@ -122,7 +123,7 @@ fn run_wave(scene: &Scene, settings: Settings, control: &Control, outcome: &mut 
 }
 
 fn run_tile(scene: &Scene, settings: Settings, tile: &mut Tile, wave: u32) -> Option<(SampleId, Rejected)> {
-    let mut tracer = settings.needs.edges.then(|| Tracer::new(settings.shift_threshold));
+    let mut tracer = settings.needs.edges.then(|| Tracer::new(settings.shift));
     let mut first_rejected = None;
     for _ in 0..wave {
         for pixel in 0..tile.width * tile.height {

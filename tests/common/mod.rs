@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 
 use fluxion::film::{Film, Needs};
+use fluxion::render::gradient::shift::Shift;
 use fluxion::render::{Budget, Control, Settings, render};
 use fluxion::scene::{Scene, load};
 
@@ -47,6 +48,11 @@ pub const ALL: Needs = Needs { features: true, edges: true, bins: true };
 
 /// Renders some samples of every pixel.
 pub fn film(scene: &Scene, spp: u32, seed: u64, needs: Needs) -> Film {
-    let settings = Settings { budget: Budget::Spp(spp), seed, needs, shift_threshold: 0.001 };
+    shifted_film(scene, spp, seed, needs, Shift::default())
+}
+
+/// The same with a shift of our choice.
+pub fn shifted_film(scene: &Scene, spp: u32, seed: u64, needs: Needs, shift: Shift) -> Film {
+    let settings = Settings { budget: Budget::Spp(spp), seed, needs, shift };
     render(scene, settings, &Control { stop: &AtomicBool::new(false), progress: &|_| {} }).film
 }

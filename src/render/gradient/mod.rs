@@ -16,24 +16,33 @@ pub struct Tracer {
 }
 
 impl Tracer {
-    /// Smooth lobes of roughness above `threshold` are reconnected through.
-    pub fn new(threshold: f32) -> Self {
-        Self { base: BasePath::default(), shift: Shift { threshold } }
+    /// Differences by a shift.
+    pub fn new(shift: Shift) -> Self {
+        Self { base: BasePath::default(), shift }
     }
 
     /// The path tracer's sample, bit for bit, with this pixel's end of each edge.
     pub fn sample(&mut self, scene: &Scene, sampler: &Sampler, view: View, id: SampleId) -> Sample {
         self.base.clear();
         let mut sample = path::trace(scene, sampler, view, &mut self.base);
-        if self.base.is_dark() {
+        // The other ends of the edges account for what copies of a dark path would carry; replays are no copies.
+        if self.shift != Shift::Replay && self.base.is_dark() {
             return sample;
         }
         let size = (scene.sensor().width as i64, scene.sensor().height as i64);
-        for (edge, (dx, dy)) in sample.edges.iter_mut().zip(EDGES) {
-            let (x, y) = (id.x as i64 + i64::from(dx), id.y as i64 + i64::from(dy));
-            if x >= 0 && y >= 0 && x < size.0 && y < size.1 {
-                *edge = self.shift.difference(scene, &self.base, view.moved((dx, dy)).ray(scene));
+        for (edge, step) in sample.edges.iter_mut().zip(EDGES) {
+            let (x, y) = (id.x as i64 + i64::from(step.0), id.y as i64 + i64::from(step.1));
+            if x < 0 || y < 0 || x >= size.0 || y >= size.1 {
+                continue;
             }
+            let neighbour = view.moved(step);
+            *edge = match self.shift {
+                Shift::Reconnect { threshold } => {
+                    shift::reconnected(scene, &self.base, threshold, neighbour.ray(scene))
+                }
+                // Both ends sample every pair of paths of the same numbers: each counts half.
+                Shift::Replay => 0.5 * (path::trace(scene, sampler, neighbour, &mut ()).color - sample.color),
+            };
         }
         sample
     }

@@ -1,5 +1,5 @@
-//! Leaving the offset's vertex as the base path leaves its own: by the same delta lobe, or mirrored about the same
-//! local half vector.
+//! Leaving the offset's vertex as the base path leaves its own: by the same delta lobe, or mirrored or refracted about
+//! the same local half vector.
 
 use super::End;
 use crate::math::{Rgb, Vec3, fresnel};
@@ -39,7 +39,13 @@ fn copy(scene: &Scene, base: &Surface, (wo, lobe): (Vec3, Lobe), offset: &Surfac
         let delta = bsdf.delta(offset, offset.wi, lobe)?;
         return Some(Copied { wo: delta.wo, value: delta.value, pdf: delta.probability, jacobian: 1.0 });
     }
-    let (wo, jacobian) = reflect(base.wi, wo, offset.wi)?;
+    let (wo, jacobian) = if base.wi.z * wo.z > 0.0 {
+        reflect(base.wi, wo, offset.wi)?
+    } else {
+        // The way back refracts at the base's material, so both must bend alike.
+        let eta = bsdf.refraction().filter(|&eta| scene.bsdf(base).refraction() == Some(eta))?;
+        refract(base.wi, wo, offset.wi, if base.wi.z > 0.0 { eta } else { 1.0 / eta })?
+    };
     let eval = bsdf.eval(offset, offset.wi, wo);
     (eval.value != Rgb::ZERO && eval.pdf > 0.0).then_some(Copied { wo, value: eval.value, pdf: eval.pdf, jacobian })
 }
@@ -60,6 +66,23 @@ pub fn reflect(wi: Vec3, wo: Vec3, offset_wi: Vec3) -> Option<(Vec3, f32)> {
     let jacobian = offset_wo.dot(h).abs() / wo.dot(h).abs();
     let same_side = wi.z * wo.z > 0.0 && offset_wi.z * offset_wo.z > 0.0;
     (same_side && jacobian > 0.0 && jacobian.is_finite()).then_some((offset_wo, jacobian))
+}
+
+/// Refracts `offset_wi` at the half vector that refracts `wi` into `wo`, and the change of solid angle dω' / dω. `eta` is
+/// the index of refraction on the side of `wo` over that on the side of `wi`. `None` under total reflection, and when
+/// the sides are not the same.
+pub fn refract(wi: Vec3, wo: Vec3, offset_wi: Vec3, eta: f32) -> Option<(Vec3, f32)> {
+    let sum = wi + wo * eta;
+    let h = sum.try_normalize()?;
+    let cos_i = offset_wi.dot(h);
+    let cos_t = (1.0 - (1.0 - cos_i * cos_i) / (eta * eta)).max(0.0).sqrt().copysign(cos_i);
+    let offset_wo = (h * (cos_i / eta - cos_t) - offset_wi / eta).try_normalize()?;
+    let growth = (offset_wi + offset_wo * eta).length_squared() / sum.length_squared();
+    let jacobian = growth * (wo.dot(h) / offset_wo.dot(h)).abs();
+    let same_sides = wi.z * offset_wi.z > 0.0 && wo.z * offset_wo.z > 0.0 && wi.z * wo.z < 0.0;
+    let refracts = wi.dot(h) * wo.dot(h) < 0.0;
+    let possible = same_sides && refracts && cos_t != 0.0 && cos_i * wi.dot(h) > 0.0;
+    (possible && jacobian > 0.0 && jacobian.is_finite()).then_some((offset_wo, jacobian))
 }
 
 impl Extended {

@@ -9,19 +9,35 @@ use super::base_path::BasePath;
 use crate::math::Rgb;
 use crate::scene::{Ray, Scene};
 
-/// Reconnection where both paths scatter diffusely, half-vector copies elsewhere.
-#[derive(Clone, Copy, Debug)]
-pub struct Shift {
-    /// Roughness above which a smooth lobe counts as diffuse.
-    pub threshold: f32,
+/// How the base path of a pixel becomes a path of its neighbour.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Shift {
+    /// Reconnection where both paths scatter diffusely, half-vector copies elsewhere.
+    Reconnect {
+        /// Roughness above which a smooth lobe counts as diffuse.
+        threshold: f32,
+    },
+    /// The neighbour's path of the same random numbers.
+    Replay,
 }
 
-impl Shift {
-    /// This end's share of (neighbour - pixel): the sum of (J f(y) - f(x)) / D over the path's contributions.
-    /// `ray` is the neighbour's camera ray.
-    pub fn difference(&self, scene: &Scene, base: &BasePath, ray: Ray) -> Rgb {
-        Walk::new(scene, self.threshold).along(&base.vertices[..base.lit_length()], ray)
+/// The shifts by name, with what they do.
+pub const SHIFTS: &[(&str, Shift, &str)] = &[
+    ("reconnect", Shift::Reconnect { threshold: 0.001 }, "join the base path where it scatters diffusely"),
+    ("replay", Shift::Replay, "trace the neighbour's path of the same random numbers; noisier, slower, never fails"),
+];
+
+impl Default for Shift {
+    fn default() -> Self {
+        let (_, shift, _) = SHIFTS[0];
+        shift
     }
+}
+
+/// This end's share of (neighbour - pixel) by reconnection: the sum of (J f(y) - f(x)) / D over the path's
+/// contributions. `ray` is the neighbour's camera ray.
+pub fn reconnected(scene: &Scene, base: &BasePath, threshold: f32, ray: Ray) -> Rgb {
+    Walk::new(scene, threshold).along(&base.vertices[..base.lit_length()], ray)
 }
 
 /// The offset's own last segment, to an emitter.
