@@ -1,6 +1,7 @@
 #include "oiio.h"
 
 #include <OpenImageIO/imageio.h>
+#include <OpenImageIO/texture.h>
 
 #include <cstring>
 #include <exception>
@@ -24,6 +25,20 @@ OIIO::TypeDesc type_of(const char *kind) {
   if (std::strcmp(kind, "half") == 0) return OIIO::TypeDesc::HALF;
   if (std::strcmp(kind, "uint8") == 0) return OIIO::TypeDesc::UINT8;
   return OIIO::TypeDesc::FLOAT;
+}
+
+bool read_samples(void *handle, OIIO::TypeDesc type, void *pixels, FluxionError *error) try {
+  auto *image = static_cast<OpenImage *>(handle);
+  const int channels = image->input->spec().nchannels;
+  if (image->input->read_image(0, 0, 0, channels, type, pixels)) return true;
+  fail(error, image->input->geterror(), "the pixels could not be read: the file may be truncated");
+  return false;
+} catch (const std::exception &exception) {
+  fail(error, exception.what(), "reading the image failed");
+  return false;
+} catch (...) {
+  fail(error, "", "reading the image failed");
+  return false;
 }
 
 }  // namespace
@@ -71,18 +86,12 @@ extern "C" const char *fluxion_image_attribute(void *handle, const char *name) t
   return nullptr;
 }
 
-extern "C" bool fluxion_image_read(void *handle, float *pixels, FluxionError *error) try {
-  auto *image = static_cast<OpenImage *>(handle);
-  const int channels = image->input->spec().nchannels;
-  if (image->input->read_image(0, 0, 0, channels, OIIO::TypeDesc::FLOAT, pixels)) return true;
-  fail(error, image->input->geterror(), "the pixels could not be read: the file may be truncated");
-  return false;
-} catch (const std::exception &exception) {
-  fail(error, exception.what(), "reading the image failed");
-  return false;
-} catch (...) {
-  fail(error, "", "reading the image failed");
-  return false;
+extern "C" bool fluxion_image_read_floats(void *handle, float *pixels, FluxionError *error) {
+  return read_samples(handle, OIIO::TypeDesc::FLOAT, pixels, error);
+}
+
+extern "C" bool fluxion_image_read_bytes(void *handle, uint8_t *pixels, FluxionError *error) {
+  return read_samples(handle, OIIO::TypeDesc::UINT8, pixels, error);
 }
 
 extern "C" void fluxion_image_close(void *handle) { delete static_cast<OpenImage *>(handle); }
@@ -114,5 +123,45 @@ extern "C" bool fluxion_image_write(const char *path, const FluxionImageSpec *wa
   return false;
 } catch (...) {
   fail(error, "", "writing the image failed");
+  return false;
+}
+
+extern "C" void *fluxion_texture_system_new(int megabytes) try {
+  OIIO::TextureSystem *system = OIIO::TextureSystem::create(false);
+  if (!system) return nullptr;
+  system->attribute("max_memory_MB", static_cast<float>(megabytes));
+  // Files in scanlines are cut into tiles as they are read.
+  system->attribute("autotile", 64);
+  system->attribute("automip", 0);
+  system->attribute("unassociatedalpha", 1);
+  return system;
+} catch (...) {
+  return nullptr;
+}
+
+extern "C" void fluxion_texture_system_release(void *system) {
+  OIIO::TextureSystem::destroy(static_cast<OIIO::TextureSystem *>(system));
+}
+
+extern "C" void *fluxion_texture_open(void *handle, const char *path, FluxionError *error) try {
+  auto *system = static_cast<OIIO::TextureSystem *>(handle);
+  auto *texture = system->get_texture_handle(OIIO::ustring(path));
+  if (texture && system->good(texture)) return texture;
+  fail(error, system->geterror(), "the file is missing or of an unknown format");
+  return nullptr;
+} catch (const std::exception &exception) {
+  fail(error, exception.what(), "opening the texture failed");
+  return nullptr;
+} catch (...) {
+  fail(error, "", "opening the texture failed");
+  return nullptr;
+}
+
+extern "C" bool fluxion_texture_texel(void *handle, void *texture, int x, int y, int channels, float *samples) try {
+  auto *system = static_cast<OIIO::TextureSystem *>(handle);
+  OIIO::TextureOpt options;
+  return system->get_texels(static_cast<OIIO::TextureSystem::TextureHandle *>(texture), nullptr, options, 0, x, x + 1, y,
+                            y + 1, 0, 1, 0, channels, OIIO::TypeDesc::FLOAT, samples);
+} catch (...) {
   return false;
 }

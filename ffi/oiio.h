@@ -5,6 +5,7 @@
 
 #include <stdbool.h>
 #include <stddef.h>
+#include <stdint.h>
 
 #ifdef __cplusplus
 extern "C" {
@@ -31,14 +32,23 @@ void *fluxion_image_open(const char *path, FluxionImageSpec *spec, FluxionError 
 /* The strings belong to the open image. Null when there is no such channel or attribute. */
 const char *fluxion_image_channel(void *image, int index);
 const char *fluxion_image_attribute(void *image, const char *name);
-/* Fills width * height * channels floats, rows from the top, channels interleaved. */
-bool fluxion_image_read(void *image, float *pixels, FluxionError *error);
+/* Fill width * height * channels samples, rows from the top, channels interleaved. */
+bool fluxion_image_read_floats(void *image, float *pixels, FluxionError *error);
+bool fluxion_image_read_bytes(void *image, uint8_t *pixels, FluxionError *error);
 void fluxion_image_close(void *image);
 
 /* `kind` is "float", "half" or "uint8"; `compression` may be null for the format's default. */
 bool fluxion_image_write(const char *path, const FluxionImageSpec *spec, const char *const *channels,
                          const float *pixels, const char *kind, const char *compression,
                          const FluxionAttribute *attributes, size_t attribute_count, FluxionError *error);
+
+/* A cache of image files that keeps at most so many megabytes of tiles in memory. Null when it cannot be made. */
+void *fluxion_texture_system_new(int megabytes);
+void fluxion_texture_system_release(void *system);
+/* A file of a system, which keeps it. Null on failure. */
+void *fluxion_texture_open(void *system, const char *path, FluxionError *error);
+/* The samples of one pixel of an open file, from the first channel on. False when it cannot be read. */
+bool fluxion_texture_texel(void *system, void *texture, int x, int y, int channels, float *samples);
 
 #ifdef __cplusplus
 }

@@ -68,6 +68,9 @@ pub struct Args {
     /// Roughness above which `reconnect` goes through a material instead of copying half vectors
     #[arg(long, value_name = "ALPHA", hide_short_help = true)]
     shift_threshold: Option<f32>,
+    /// Megabytes of textures to hold in memory; further images are read tile by tile as they are needed
+    #[arg(long, default_value_t = 4096, value_name = "MB", value_parser = clap::value_parser!(u64).range(..1 << 40), hide_short_help = true)]
+    texture_memory: u64,
     /// Show no progress
     #[arg(short, long)]
     quiet: bool,
@@ -97,7 +100,9 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let _claims = Claims::new(&args.output, &[&args.layers, &args.json], None)?;
     let mut stats = Stats { method: args.method.clone(), ..Stats::default() };
     let start = Instant::now();
-    let options = load::Options { parameters: args.define.clone(), size: args.size, threads: args.threads };
+    let texture_memory = args.texture_memory << 20;
+    let options =
+        load::Options { parameters: args.define.clone(), size: args.size, threads: args.threads, texture_memory };
     let scene = load::load(&args.scene, &options)?;
     stats.seconds.load = start.elapsed().as_secs_f64();
     if scene.emitters().is_empty() {

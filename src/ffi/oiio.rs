@@ -3,6 +3,7 @@
 
 use std::ffi::{CStr, CString, c_char, c_void};
 use std::path::Path;
+use std::sync::Arc;
 
 use super::raw::oiio as raw;
 use crate::error::{Error, Result};
@@ -50,12 +51,24 @@ const MAX_SAMPLES: usize = 1 << 32;
 /// So are more than this for every byte of the file: no compression packs real pictures like that.
 const MAX_SAMPLES_PER_BYTE: usize = 1 << 11;
 
-struct Open(*mut c_void);
+/// An image file whose header has been read.
+pub struct ImageFile<'a> {
+    /// Pixels in a row.
+    pub width: usize,
+    /// Number of rows.
+    pub height: usize,
+    /// Channel names, in the order of the file.
+    pub channels: Vec<String>,
+    /// Whether the file holds eight bits a sample.
+    pub eight_bit: bool,
+    path: &'a Path,
+    handle: *mut c_void,
+}
 
-impl Drop for Open {
+impl Drop for ImageFile<'_> {
     fn drop(&mut self) {
         // SAFETY: the handle came from fluxion_image_open and is closed once.
-        unsafe { raw::fluxion_image_close(self.0) }
+        unsafe { raw::fluxion_image_close(self.handle) }
     }
 }
 
@@ -75,40 +88,129 @@ unsafe fn owned(text: *const c_char) -> Option<String> {
     (!text.is_null()).then(|| unsafe { CStr::from_ptr(text) }.to_string_lossy().into_owned())
 }
 
+impl<'a> ImageFile<'a> {
+    /// Reads the header.
+    pub fn open(path: &'a Path) -> Result<Self> {
+        let bytes = std::fs::metadata(path).map_err(|error| Error::io(path, error))?.len() as usize;
+        let name = path_string(path)?;
+        let mut spec = raw::FluxionImageSpec::default();
+        let mut error = raw::FluxionError::default();
+        // SAFETY: all pointers are valid for the call.
+        let handle = unsafe { raw::fluxion_image_open(name.as_ptr(), &mut spec, &mut error) };
+        if handle.is_null() {
+            return Err(Error::io(path, message(&error)));
+        }
+        let [width, height] = [spec.width, spec.height].map(|n| usize::try_from(n).unwrap_or(0));
+        let eight_bit = spec.eight_bit;
+        let mut file = Self { width, height, channels: Vec::new(), eight_bit, path, handle };
+        file.channels = (0..spec.channels)
+            // SAFETY: the handle is open; the string lives as long.
+            .map(|index| unsafe { owned(raw::fluxion_image_channel(handle, index)) }.unwrap_or_default())
+            .collect();
+        let samples = file.samples();
+        if samples == 0 || samples > MAX_SAMPLES.min(bytes.saturating_mul(MAX_SAMPLES_PER_BYTE)) {
+            let what = format!("the header claims {width}x{height} pixels of {} channels", spec.channels);
+            return Err(Error::io(path, what));
+        }
+        Ok(file)
+    }
+
+    /// Samples of all pixels.
+    fn samples(&self) -> usize {
+        let pixels = self.width.checked_mul(self.height);
+        pixels.and_then(|pixels| pixels.checked_mul(self.channels.len())).unwrap_or(usize::MAX)
+    }
+
+    /// A named string of the header.
+    pub fn attribute(&self, name: &str) -> Option<String> {
+        let name = CString::new(name).ok()?;
+        // SAFETY: the handle is open; the string is copied before the next call.
+        unsafe { owned(raw::fluxion_image_attribute(self.handle, name.as_ptr())) }
+    }
+
+    /// All samples as floats, channels interleaved.
+    pub fn floats(&self) -> Result<Vec<f32>> {
+        let mut data = vec![0.0; self.samples()];
+        let mut error = raw::FluxionError::default();
+        // SAFETY: `data` has room for width * height * channels floats.
+        let read = unsafe { raw::fluxion_image_read_floats(self.handle, data.as_mut_ptr(), &mut error) };
+        if read { Ok(data) } else { Err(Error::io(self.path, message(&error))) }
+    }
+
+    /// All samples in eight bits, channels interleaved.
+    pub fn bytes(&self) -> Result<Vec<u8>> {
+        let mut data = vec![0; self.samples()];
+        let mut error = raw::FluxionError::default();
+        // SAFETY: `data` has room for width * height * channels bytes.
+        let read = unsafe { raw::fluxion_image_read_bytes(self.handle, data.as_mut_ptr(), &mut error) };
+        if read { Ok(data) } else { Err(Error::io(self.path, message(&error))) }
+    }
+}
+
 /// Reads a whole image, and those of `attributes` that its header has.
 pub fn read(path: &Path, attributes: &[&str]) -> Result<Pixels> {
-    let bytes = std::fs::metadata(path).map_err(|error| Error::io(path, error))?.len() as usize;
-    let name = path_string(path)?;
-    let mut spec = raw::FluxionImageSpec::default();
-    let mut error = raw::FluxionError::default();
-    // SAFETY: all pointers are valid for the call.
-    let handle = unsafe { raw::fluxion_image_open(name.as_ptr(), &mut spec, &mut error) };
-    if handle.is_null() {
-        return Err(Error::io(path, message(&error)));
+    let file = ImageFile::open(path)?;
+    let attributes = attributes.iter().filter_map(|&name| Some((name.to_owned(), file.attribute(name)?))).collect();
+    let (width, height, eight_bit, channels) = (file.width, file.height, file.eight_bit, file.channels.clone());
+    Ok(Pixels { width, height, channels, data: file.floats()?, eight_bit, attributes })
+}
+
+/// A cache of image files that are too large to be held at once.
+pub struct TextureSystem(*mut c_void);
+
+// SAFETY: OpenImageIO's texture systems are made to be shared by threads.
+unsafe impl Send for TextureSystem {}
+// SAFETY: as above.
+unsafe impl Sync for TextureSystem {}
+
+impl Drop for TextureSystem {
+    fn drop(&mut self) {
+        // SAFETY: the system came from fluxion_texture_system_new and is released once, after its textures.
+        unsafe { raw::fluxion_texture_system_release(self.0) }
     }
-    let open = Open(handle);
-    let [width, height, count] = [spec.width, spec.height, spec.channels].map(|n| usize::try_from(n).unwrap_or(0));
-    let samples = width.checked_mul(height).and_then(|pixels| pixels.checked_mul(count)).unwrap_or(usize::MAX);
-    if samples == 0 || samples > MAX_SAMPLES.min(bytes.saturating_mul(MAX_SAMPLES_PER_BYTE)) {
-        return Err(Error::io(path, format!("the header claims {width}x{height} pixels of {count} channels")));
+}
+
+/// A file in a texture system.
+pub struct CachedTexture {
+    system: Arc<TextureSystem>,
+    texture: *mut c_void,
+}
+
+// SAFETY: as for the system that owns the texture.
+unsafe impl Send for CachedTexture {}
+// SAFETY: as above.
+unsafe impl Sync for CachedTexture {}
+
+impl TextureSystem {
+    /// A system that keeps at most so many megabytes of tiles in memory.
+    pub fn new(megabytes: u32) -> Option<Arc<Self>> {
+        // SAFETY: takes no pointer.
+        let raw = unsafe { raw::fluxion_texture_system_new(i32::try_from(megabytes).unwrap_or(i32::MAX)) };
+        (!raw.is_null()).then(|| Arc::new(Self(raw)))
     }
-    let channels = (0..spec.channels)
-        // SAFETY: the handle is open; the string lives as long.
-        .map(|index| unsafe { owned(raw::fluxion_image_channel(open.0, index)) }.unwrap_or_default())
-        .collect();
-    let found = attributes.iter().filter_map(|&name| {
-        let c_name = CString::new(name).ok()?;
-        // SAFETY: the handle is open; the string is copied before the next call.
-        let value = unsafe { owned(raw::fluxion_image_attribute(open.0, c_name.as_ptr())) }?;
-        Some((name.to_owned(), value))
-    });
-    let attributes = found.collect();
-    let mut data = vec![0.0; samples];
-    // SAFETY: `data` has room for width * height * channels floats.
-    if !unsafe { raw::fluxion_image_read(open.0, data.as_mut_ptr(), &mut error) } {
-        return Err(Error::io(path, message(&error)));
+}
+
+impl CachedTexture {
+    /// Opens a file.
+    pub fn open(system: &Arc<TextureSystem>, path: &Path) -> Result<Self> {
+        let name = path_string(path)?;
+        let mut error = raw::FluxionError::default();
+        // SAFETY: all pointers are valid for the call.
+        let texture = unsafe { raw::fluxion_texture_open(system.0, name.as_ptr(), &mut error) };
+        if texture.is_null() {
+            return Err(Error::io(path, message(&error)));
+        }
+        Ok(Self { system: Arc::clone(system), texture })
     }
-    Ok(Pixels { width, height, channels, data, eight_bit: spec.eight_bit, attributes })
+
+    /// The first samples of a pixel, at most `samples.len()`; zero where the file can no longer be read.
+    pub fn texel(&self, x: usize, y: usize, samples: &mut [f32]) {
+        let (x, y, count) = (x as i32, y as i32, samples.len() as i32);
+        // SAFETY: the system is alive, the texture is one of its own, and `samples` has room for `count` floats.
+        if !unsafe { raw::fluxion_texture_texel(self.system.0, self.texture, x, y, count, samples.as_mut_ptr()) } {
+            samples.fill(0.0);
+        }
+    }
 }
 
 /// Writes an image in the format of the path's extension.

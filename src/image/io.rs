@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::Image;
 use crate::error::{Error, Result};
-pub use crate::ffi::oiio::{Kind, Pixels, read, write};
+pub use crate::ffi::oiio::{CachedTexture, ImageFile, Kind, Pixels, TextureSystem, read, write};
 use crate::math::srgb_encode;
 
 /// Formats that hold linear radiance as floats.
@@ -45,12 +45,12 @@ pub fn write_color(path: &Path, image: &Image, attributes: &[(String, String)]) 
 }
 
 /// Positions of the R, G and B channels. Without them, a file of up to `grey` channels has its first one thrice.
-pub fn rgb_channels(path: &Path, pixels: &Pixels, grey: usize) -> Result<[usize; 3]> {
-    let find = |name: &str| pixels.channels.iter().position(|other| other.eq_ignore_ascii_case(name));
+pub fn rgb_channels(path: &Path, channels: &[String], grey: usize) -> Result<[usize; 3]> {
+    let find = |name: &str| channels.iter().position(|other| other.eq_ignore_ascii_case(name));
     match (find("R"), find("G"), find("B")) {
         (Some(r), Some(g), Some(b)) => Ok([r, g, b]),
-        _ if pixels.channels.len() <= grey => Ok([0; 3]),
-        _ => Err(Error::io(path, format!("no channels R, G, B among {}", pixels.channels.join(", ")))),
+        _ if channels.len() <= grey => Ok([0; 3]),
+        _ => Err(Error::io(path, format!("no channels R, G, B among {}", channels.join(", ")))),
     }
 }
 
@@ -58,7 +58,7 @@ pub fn rgb_channels(path: &Path, pixels: &Pixels, grey: usize) -> Result<[usize;
 /// decoded from sRGB.
 pub fn read_color(path: &Path) -> Result<Image> {
     let pixels = read(path, &[])?;
-    let wanted = rgb_channels(path, &pixels, 1)?;
+    let wanted = rgb_channels(path, &pixels.channels, 1)?;
     let decode = |value: f32| if pixels.eight_bit { crate::math::srgb_decode(value) } else { value };
     let count = pixels.channels.len();
     let data = pixels.data.chunks_exact(count).flat_map(|pixel| wanted.map(|c| decode(pixel[c]))).collect();

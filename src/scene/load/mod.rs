@@ -34,7 +34,7 @@ const MAX_NESTING: usize = 32;
 const MAX_PIXELS: u64 = 1 << 28;
 
 /// What the command line may say about a scene before it is read.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Options {
     /// Values for the file's `$name` parameters, over its `<default>`s.
     pub parameters: Vec<(String, String)>,
@@ -42,6 +42,14 @@ pub struct Options {
     pub size: Option<(usize, usize)>,
     /// Threads for building (0: all).
     pub threads: usize,
+    /// Bytes of image textures to hold in memory; files beyond them are read tile by tile as they are needed.
+    pub texture_memory: u64,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self { parameters: Vec::new(), size: None, threads: 0, texture_memory: 4 << 30 }
+    }
 }
 
 /// A mesh as files give it, before it is placed in the world. Normals and texture coordinates are empty or
@@ -76,6 +84,7 @@ pub struct Loader {
     bsdfs: HashMap<*const Object, Arc<dyn Bsdf>>,
     textures: HashMap<*const Object, Arc<dyn Texture>>,
     bitmaps: HashMap<PathBuf, Arc<texture::Texels>>,
+    texture_memory: texture::Memory,
     meshes: HashMap<PathBuf, Arc<Vec<u8>>>,
     nesting: usize,
     /// Textures that need to know all shapes.
@@ -93,6 +102,7 @@ pub fn load(path: &Path, options: &Options) -> Result<Scene> {
         bsdfs: HashMap::new(),
         textures: HashMap::new(),
         bitmaps: HashMap::new(),
+        texture_memory: texture::Memory::new(options.texture_memory),
         meshes: HashMap::new(),
         nesting: 0,
         attributes: Vec::new(),
@@ -272,7 +282,7 @@ impl Loader {
         if let Some(texels) = self.bitmaps.get(&path) {
             return Ok(Arc::clone(texels));
         }
-        let texels = Arc::new(texture::Texels::read(&path)?);
+        let texels = Arc::new(texture::Texels::read(&path, &mut self.texture_memory)?);
         self.bitmaps.insert(path, Arc::clone(&texels));
         Ok(texels)
     }

@@ -4,6 +4,7 @@
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
+use std::sync::Arc;
 
 use roxmltree::{Document, Node};
 
@@ -63,12 +64,26 @@ struct Parser {
 #[derive(Clone, Copy)]
 struct At<'a> {
     node: Node<'a, 'a>,
-    file: &'a Path,
+    file: &'a File,
+}
+
+/// A file with where its lines start.
+struct File {
+    path: Arc<Path>,
+    lines: Vec<usize>,
+}
+
+impl File {
+    fn new(path: &Path, text: &str) -> Self {
+        let ends = text.bytes().enumerate().filter(|(_, byte)| *byte == b'\n');
+        Self { path: Arc::from(path), lines: ends.map(|(at, _)| at).collect() }
+    }
 }
 
 impl<'a> At<'a> {
     fn place(self) -> Place {
-        Place::line(self.file, self.node.document().text_pos_at(self.node.range().start).row)
+        let line = self.file.lines.partition_point(|&end| end < self.node.range().start) as u32 + 1;
+        Place { file: Arc::clone(&self.file.path), line }
     }
 
     fn tag(self) -> &'a str {
@@ -85,7 +100,8 @@ impl Parser {
         let text = std::fs::read_to_string(path).map_err(|error| Error::io(path, error))?;
         let place = |row: u32| Place::line(path, row);
         let document = Document::parse(&text).map_err(|error| place(error.pos().row).invalid(error.to_string()))?;
-        let root = At { node: document.root_element(), file: path };
+        let file = File::new(path, &text);
+        let root = At { node: document.root_element(), file: &file };
         if root.tag() != "scene" {
             return Err(root.place().invalid(format!("a scene file starts with <scene>, not <{}>", root.tag())));
         }
@@ -118,7 +134,7 @@ impl Parser {
             "include" => {
                 let name = self.attribute(at, "filename")?;
                 let path = self.find(&name).ok_or_else(|| at.place().invalid(format!("no file `{name}`")))?;
-                if self.includes.len() >= MAX_INCLUDES || self.includes.contains(&path) || path == at.file {
+                if self.includes.len() >= MAX_INCLUDES || self.includes.contains(&path) || *path == *at.file.path {
                     return Err(at.place().invalid(format!("`{name}` includes itself")));
                 }
                 if self.tree.sources.len() >= MAX_FILES {

@@ -1,12 +1,10 @@
 //! Image files as textures: nearest or bilinear, in linear colour. Eight-bit files stay in eight bits.
 
-use std::path::Path;
 use std::sync::{Arc, OnceLock};
 
-use super::{Point, Texture, UvTransform};
+use super::{Point, Texels, Texture, UvTransform};
 use crate::error::Result;
-use crate::image::io;
-use crate::math::{Rgb, Vec2, luminance, srgb_decode, vec2, vec3};
+use crate::math::{Rgb, Vec2, luminance, vec2};
 use crate::scene::load::props::Object;
 use crate::scene::load::{Loader, Plugin};
 
@@ -28,64 +26,7 @@ fn make(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Texture>> {
     let to_uv = UvTransform::load(object)?;
     let path = loader.file(object)?;
     let texels = loader.texels(path)?;
-    let mut bitmap = Bitmap { texels, nearest, wrap, raw, to_uv, mean: 0.0 };
-    bitmap.mean = bitmap.average();
-    Ok(Arc::new(bitmap))
-}
-
-/// An image as it is stored: one or three channels, alpha dropped.
-pub struct Texels {
-    /// Pixels in a row.
-    pub width: usize,
-    /// Number of rows.
-    pub height: usize,
-    samples: Samples,
-}
-
-enum Samples {
-    Byte(Vec<[u8; 3]>),
-    Float(Vec<Rgb>),
-}
-
-impl Texels {
-    /// Reads an image file; grey is spread over the three channels.
-    pub fn read(path: &Path) -> Result<Self> {
-        let pixels = io::read(path, &[])?;
-        let order = io::rgb_channels(path, &pixels, 2)?;
-        let texels = pixels.data.chunks_exact(pixels.channels.len()).map(|pixel| order.map(|channel| pixel[channel]));
-        let samples = if pixels.eight_bit {
-            Samples::Byte(texels.map(|texel| texel.map(|value| (value * 255.0).round() as u8)).collect())
-        } else {
-            // A texel that is not a number would poison every path that meets it.
-            let finite = |value: f32| if value.is_finite() { value } else { 0.0 };
-            Samples::Float(texels.map(|texel| Rgb::from_array(texel.map(finite))).collect())
-        };
-        Ok(Self { width: pixels.width, height: pixels.height, samples })
-    }
-
-    /// Linear colour of a texel. `raw`: take eight-bit values as they are instead of decoding sRGB.
-    #[inline]
-    pub fn texel(&self, x: usize, y: usize, raw: bool) -> Rgb {
-        let at = y * self.width + x;
-        match &self.samples {
-            Samples::Float(texels) => texels[at],
-            Samples::Byte(texels) => {
-                let [r, g, b] = texels[at];
-                let table = if raw { linear_table() } else { srgb_table() };
-                vec3(table[r as usize], table[g as usize], table[b as usize])
-            }
-        }
-    }
-}
-
-fn srgb_table() -> &'static [f32; 256] {
-    static TABLE: OnceLock<[f32; 256]> = OnceLock::new();
-    TABLE.get_or_init(|| std::array::from_fn(|i| srgb_decode(i as f32 / 255.0)))
-}
-
-fn linear_table() -> &'static [f32; 256] {
-    static TABLE: OnceLock<[f32; 256]> = OnceLock::new();
-    TABLE.get_or_init(|| std::array::from_fn(|i| i as f32 / 255.0))
+    Ok(Arc::new(Bitmap { texels, nearest, wrap, raw, to_uv, mean: OnceLock::new() }))
 }
 
 #[derive(Clone, Copy)]
@@ -116,7 +57,8 @@ struct Bitmap {
     wrap: Wrap,
     raw: bool,
     to_uv: UvTransform,
-    mean: f32,
+    /// Taken when it is first asked for: most textures never are.
+    mean: OnceLock<f32>,
 }
 
 /// The four texels around a point, and how far it is from the first to the others.
@@ -172,7 +114,7 @@ impl Texture for Bitmap {
     }
 
     fn mean(&self) -> f32 {
-        self.mean
+        *self.mean.get_or_init(|| self.average())
     }
 }
 
@@ -190,10 +132,9 @@ mod tests {
 
     #[test]
     fn bilinear_passes_through_texel_centres_and_its_gradient_is_its_slope() {
-        let samples = Samples::Float((0..12).map(|i| Rgb::splat((i * i) as f32)).collect());
-        let texels = Arc::new(Texels { width: 4, height: 3, samples });
+        let texels = Arc::new(Texels::from_colors(4, (0..12).map(|i| Rgb::splat((i * i) as f32)).collect()));
         let to_uv = UvTransform { u: vec2(1.0, 0.0), v: vec2(0.0, 1.0), origin: Vec2::ZERO };
-        let bitmap = Bitmap { texels, nearest: false, wrap: Wrap::Repeat, raw: true, to_uv, mean: 0.0 };
+        let bitmap = Bitmap { texels, nearest: false, wrap: Wrap::Repeat, raw: true, to_uv, mean: OnceLock::new() };
         let at = |uv| Point { uv, ..Point::default() };
         assert!((bitmap.color(&at(vec2(1.5 / 4.0, 2.5 / 3.0))).x - 81.0).abs() < 1e-4);
         let (uv, h) = (vec2(0.4, 0.55), 1e-3);

@@ -3,10 +3,11 @@
 mod bitmap;
 mod checkerboard;
 mod mesh_attribute;
+mod texels;
 mod uniform;
 
-pub use self::bitmap::Texels;
 pub use self::mesh_attribute::Unbound;
+pub use self::texels::{Memory, Texels};
 use super::load::Plugin;
 use super::load::props::Object;
 use crate::error::Result;
