@@ -1,14 +1,11 @@
 //! Scene files to a [`Scene`]: `xml` reads the text into objects, the plugin tables of the sibling folders turn
 //! objects into what they describe. Everything that can fail fails here.
 
-mod cie;
 mod contents;
 pub mod integrator;
 mod legacy;
-mod obj;
-mod ply;
+pub mod mesh;
 pub mod props;
-mod serialized;
 mod spectrum;
 mod transform;
 mod xml;
@@ -20,13 +17,14 @@ use std::sync::Arc;
 
 pub use self::contents::CONTAINERS;
 use self::contents::Contents;
+pub use self::mesh::MeshData;
 use self::props::{Object, Property, Value};
 use super::bsdf::{self, Bsdf};
 use super::shape::Geometry;
 use super::texture::{self, Texture};
 use super::{Parts, Scene, sensor};
 use crate::error::{Error, Place, Result};
-use crate::math::{Rgb, Vec2, Vec3, rng};
+use crate::math::{Rgb, rng};
 
 /// Nesting deeper than this (a BSDF in a BSDF in ...) is taken for a loop of references.
 const MAX_NESTING: usize = 32;
@@ -52,22 +50,6 @@ impl Default for Options {
     }
 }
 
-/// A mesh as files give it, before it is placed in the world. Normals and texture coordinates are empty or
-/// there for every vertex; triangles only name vertices that exist.
-#[derive(Clone, Debug, Default)]
-pub struct MeshData {
-    /// Vertex positions.
-    pub positions: Vec<Vec3>,
-    /// Vertex normals, of any length.
-    pub normals: Vec<Vec3>,
-    /// Texture coordinates.
-    pub uvs: Vec<Vec2>,
-    /// Vertex numbers, counter-clockwise seen from outside.
-    pub triangles: Vec<[u32; 3]>,
-    /// Values by name: one a vertex under `vertex_...`, one a triangle under `face_...`.
-    pub attributes: Vec<(String, Vec<Rgb>)>,
-}
-
 /// One row of a plugin table: a `type`, what it is, what it takes and how it is made.
 pub struct Plugin<T: 'static> {
     /// The `type` in scene files.
@@ -85,7 +67,7 @@ pub struct Loader {
     textures: HashMap<*const Object, Arc<dyn Texture>>,
     bitmaps: HashMap<PathBuf, Arc<texture::Texels>>,
     texture_memory: texture::Memory,
-    meshes: HashMap<PathBuf, Arc<Vec<u8>>>,
+    meshes: HashMap<PathBuf, Vec<u8>>,
     nesting: usize,
     /// Textures that need to know all shapes.
     pub attributes: Vec<texture::Unbound>,
@@ -287,26 +269,20 @@ impl Loader {
         Ok(texels)
     }
 
-    /// The mesh of a shape object of type obj, ply or serialized.
+    /// The mesh of a shape object whose type is a format of meshes.
     pub fn mesh(&mut self, object: &Object) -> Result<MeshData> {
         let path = self.file(object)?;
-        let mesh = match object.plugin.as_str() {
-            "obj" => obj::read(&path),
-            "ply" => ply::read(&path),
-            _ => {
-                let index = object.integer("shape_index", 0)?;
-                let index = usize::try_from(index)
-                    .map_err(|_| object.place_of("shape_index").invalid("`shape_index` cannot be negative"))?;
-                if !self.meshes.contains_key(&path) {
-                    self.meshes.insert(path.clone(), Arc::new(serialized::bytes(&path)?));
-                }
-                serialized::read(&self.meshes[&path], index, &path)
-            }
-        }?;
-        if mesh.positions.len() >= u32::MAX as usize {
-            return Err(Place::file(&path).unsupported("a mesh of more than four billion vertices"));
+        let bytes = |path: &Path| std::fs::read(path).map_err(|error| Error::io(path, error));
+        if object.plugin != "serialized" {
+            return mesh::read(&object.plugin, &bytes(&path)?, 0, &path);
         }
-        Ok(mesh)
+        let index = usize::try_from(object.integer("shape_index", 0)?)
+            .map_err(|_| object.place_of("shape_index").invalid("`shape_index` cannot be negative"))?;
+        // One such file holds many meshes.
+        if !self.meshes.contains_key(&path) {
+            self.meshes.insert(path.clone(), bytes(&path)?);
+        }
+        mesh::read(&object.plugin, &self.meshes[&path], index, &path)
     }
 
     /// A geometry whose transform or numbers leave the range of floats cannot be traced.

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use super::MeshData;
-use crate::error::{Error, Place, Result};
+use crate::error::{Place, Result};
 use crate::math::{Vec2, Vec3, vec2, vec3};
 
 /// Position, texture coordinate and normal of a corner, as numbers from 0.
@@ -13,9 +13,8 @@ type Corner = (usize, Option<usize>, Option<usize>);
 /// Reads a mesh. Corners that agree in position, texture coordinate and normal share a vertex; faces with more than
 /// three corners become fans, and negative numbers count from the latest entry. A corner without a texture coordinate
 /// or normal, in a file that has them, gets zero.
-pub fn read(path: &Path) -> Result<MeshData> {
-    let bytes = std::fs::read(path).map_err(|error| Error::io(path, error))?;
-    let text = String::from_utf8_lossy(&bytes);
+pub fn read(bytes: &[u8], path: &Path) -> Result<MeshData> {
+    let text = String::from_utf8_lossy(bytes);
     let mut file = File::default();
     for (number, line) in (1..).zip(text.lines()) {
         file.line(line).map_err(|what| Place::line(path, number).invalid(what))?;
@@ -105,9 +104,7 @@ mod tests {
     use super::*;
 
     fn parse(text: &str) -> Result<MeshData> {
-        let file = tempfile::NamedTempFile::new().unwrap();
-        std::fs::write(file.path(), text).unwrap();
-        read(file.path())
+        read(text.as_bytes(), Path::new("mesh.obj"))
     }
 
     #[test]

@@ -6,7 +6,7 @@ use ply_rs_bw::parser::{ParseError, Parser, Reader};
 use ply_rs_bw::ply::{ElementDef, Property, PropertyAccess, PropertyAccessResult, PropertyType};
 
 use super::MeshData;
-use crate::error::{Error, Place, Result};
+use crate::error::{Place, Result};
 use crate::math::{Rgb, Vec2, Vec3};
 
 /// A vertex as the file has it; what it does not have stays zero.
@@ -121,17 +121,15 @@ fn attributes<'a>(
 }
 
 /// Reads a mesh; faces with more than three corners become fans.
-pub fn read(path: &Path) -> Result<MeshData> {
+pub fn read(bytes: &[u8], path: &Path) -> Result<MeshData> {
     let place = Place::file(path);
-    let file = std::fs::File::open(path).map_err(|error| Error::io(path, error))?;
-    let size = file.metadata().map_err(|error| Error::io(path, error))?.len();
-    let mut reader = Reader::new(std::io::BufReader::with_capacity(1 << 20, file));
+    let mut reader = Reader::new(bytes);
     let damaged = |error: ParseError| place.invalid(format!("not a readable PLY file: {error}"));
     let header = Parser::<Vertex>::new().read_header(&mut reader).map_err(damaged)?;
     let mut mesh = MeshData::default();
     for (name, element) in &header.elements {
         // Every entry takes at least one byte: a larger count is a damaged header.
-        if element.count as u64 > size {
+        if element.count > bytes.len() {
             return Err(place.invalid(format!("{} entries of `{name}` do not fit in the file", element.count)));
         }
         match name.as_str() {

@@ -1,6 +1,7 @@
 //! Spectra as linear sRGB, the way Mitsuba's rgb mode converts them.
 
-use super::cie;
+mod cie;
+
 use crate::error::{Place, Result};
 use crate::math::{Rgb, vec3};
 

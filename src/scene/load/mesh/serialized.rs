@@ -9,7 +9,7 @@ use std::path::Path;
 use flate2::read::ZlibDecoder;
 
 use super::MeshData;
-use crate::error::{Error, Place, Result};
+use crate::error::{Place, Result};
 use crate::math::{Vec2, Vec3};
 
 const IDENTIFIER: u16 = 0x041c;
@@ -118,11 +118,6 @@ impl<R: Read> Reader<R> {
         };
         (0..count).map(|_| one(self)).collect()
     }
-}
-
-/// Reads a whole file, for [`read`].
-pub fn bytes(path: &Path) -> Result<Vec<u8>> {
-    std::fs::read(path).map_err(|error| Error::io(path, error))
 }
 
 #[cfg(test)]

@@ -1,0 +1,15 @@
+#!/bin/sh
+# Fills the corpora from the bundled scenes, small mesh files first.
+set -eu
+cd "$(dirname "$0")"
+mkdir -p corpus/scene corpus/mesh
+for scene in ../scenes/*/scene.xml ../scenes/unit/*/scene.xml; do
+	name=$(basename "$(dirname "$scene")")
+	sed 's|\.\./\.\./assets|/nowhere|; s|\.\./assets|/nowhere|' "$scene" > "corpus/scene/$name.xml"
+done
+put() { { printf "$1"; cat; } > "corpus/mesh/$2"; }
+printf 'v 0 0 0\nv 1 0 0\nv 1 1 0\nvt 0 1\nvn 0 0 1\nf 1/1/1 2/1/1 -1/1/1\nf 1 2 3\nf 1//1 2//1 3//1\n' | put '\000' small.obj
+printf 'ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\nelement face 1\nproperty list uchar int vertex_indices\nproperty float weight_0\nend_header\n0 0 0 1 2 3\n1 0 0 1 2 3\n1 1 0 1 2 3\n3 0 1 2 0.5\n' | put '\001' small.ply
+put '\001' torus.ply < ../scenes/assets/torus_binary.ply
+put '\001' colors.ply < ../scenes/assets/torus_colors.ply
+put '\002' torus.serialized < ../scenes/assets/torus.serialized
