@@ -117,6 +117,16 @@ fn the_program_tells_what_it_knows() {
 }
 
 #[test]
+fn the_documents_hold_what_the_program_prints() {
+    let folder = tempfile::tempdir().unwrap();
+    for (flag, document) in [("--plugins", "docs/mitsuba-support.md"), ("--layers", "docs/layers.md")] {
+        let output = fluxion(folder.path()).args(["info", flag]).output().unwrap();
+        let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(document)).unwrap();
+        assert!(text.contains(&*String::from_utf8_lossy(&output.stdout)), "{document} is not up to date with {flag}");
+    }
+}
+
+#[test]
 fn mistakes_are_told_apart_and_leave_nothing_behind() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("cut.exr"), b"v/1\x01").unwrap();

@@ -21,7 +21,7 @@ fn mistakes_are_named_with_their_line() {
         ("<shape type=\"spere\"/>", "scene.xml:2: shape `spere` is not known; there are obj, ply"),
         (
             "\n<shape type=\"sphere\"><float name=\"radiu\" value=\"1\"/></shape>",
-            "scene.xml:3: shape `sphere` has no property `radiu`; it takes: center, radius",
+            "scene.xml:3: shape `sphere` has no property `radiu`; it takes: center = 0, radius = 1",
         ),
         ("<shape type=\"sphere\"><float name=\"radius\" value=\"one\"/></shape>", "`one` is not a finite number"),
         ("<shape type=\"sphere\"><float name=\"radius\" value=\"nan\"/></shape>", "`nan` is not a finite number"),
@@ -54,7 +54,7 @@ fn mistakes_are_named_with_their_line() {
             "a crop window of 3x576 at 6,0",
         ),
         ("CAMERA<emitter type=\"spot\"><float name=\"cutoff_angle\" value=\"100\"/></emitter>", "a cone of 100"),
-        ("<emitter type=\"sunsky\"/>", "`sunsky` is not known; there are envmap"),
+        ("<emitter type=\"sunsky\"/>", "`sunsky` is not supported: bake it"),
         ("<shape type=\"instance\"/>", "needs exactly one shapegroup"),
         (
             "<shape type=\"instance\"><shape type=\"shapegroup\"><shape type=\"sphere\"><emitter type=\"area\"/></shape></shape></shape>",

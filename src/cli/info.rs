@@ -95,6 +95,8 @@ fn plugins() {
     emitter::PLUGINS.iter().for_each(|plugin| row("emitter", plugin.name, plugin.parameters));
     sensor::PLUGINS.iter().for_each(|(name, parameters)| row("sensor", name, parameters));
     integrator::PLUGINS.iter().for_each(|(name, parameters)| row("integrator", name, parameters));
+    println!("\n| left out | type | why, or what to do |\n|---|---|---|");
+    load::UNSUPPORTED.iter().for_each(|(class, name, reason)| row(class, name, reason));
 }
 
 fn describe(scene: &Scene, method: &str) -> Result<()> {

@@ -14,7 +14,8 @@ use crate::scene::texture::Texture;
 /// `bumpmap`.
 pub const PLUGIN: Plugin<Arc<dyn Bsdf>> = Plugin {
     name: "bumpmap",
-    parameters: "scale, flip_invalid_normals, use_shadowing_function, one nested texture, one nested bsdf",
+    parameters: "scale = 1, flip_invalid_normals = true, use_shadowing_function = true, one nested texture, \
+        one nested bsdf",
     make,
 };
 

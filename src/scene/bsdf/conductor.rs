@@ -12,7 +12,7 @@ use crate::scene::texture::Texture;
 
 /// `conductor`.
 pub const PLUGIN: Plugin<Arc<dyn Bsdf>> =
-    Plugin { name: "conductor", parameters: "material, eta, k, specular_reflectance", make };
+    Plugin { name: "conductor", parameters: "material = none, eta, k, specular_reflectance = 1", make };
 
 fn make(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Bsdf>> {
     Ok(Arc::new(Conductor { metal: Metal::load(object, loader)? }))

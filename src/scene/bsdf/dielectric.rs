@@ -11,8 +11,11 @@ use crate::scene::load::{Loader, Plugin};
 use crate::scene::texture::Texture;
 
 /// `dielectric`.
-pub const PLUGIN: Plugin<Arc<dyn Bsdf>> =
-    Plugin { name: "dielectric", parameters: "int_ior, ext_ior, specular_reflectance, specular_transmittance", make };
+pub const PLUGIN: Plugin<Arc<dyn Bsdf>> = Plugin {
+    name: "dielectric",
+    parameters: "int_ior = bk7, ext_ior = air, specular_reflectance = 1, specular_transmittance = 1",
+    make,
+};
 
 fn make(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Bsdf>> {
     Ok(Arc::new(Dielectric {

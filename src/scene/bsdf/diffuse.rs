@@ -12,7 +12,7 @@ use crate::scene::load::{Loader, Plugin};
 use crate::scene::texture::{Constant, Texture};
 
 /// `diffuse`.
-pub const PLUGIN: Plugin<Arc<dyn Bsdf>> = Plugin { name: "diffuse", parameters: "reflectance", make };
+pub const PLUGIN: Plugin<Arc<dyn Bsdf>> = Plugin { name: "diffuse", parameters: "reflectance = 0.5", make };
 
 fn make(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Bsdf>> {
     Ok(Arc::new(Diffuse { reflectance: loader.texture(object, "reflectance", Rgb::splat(0.5))? }))

@@ -11,7 +11,7 @@ use crate::scene::load::{Loader, Plugin};
 use crate::scene::texture::Texture;
 
 /// `mask`. Shadow rays do not see through: what lies behind is found by the paths that go through.
-pub const PLUGIN: Plugin<Arc<dyn Bsdf>> = Plugin { name: "mask", parameters: "opacity, one nested bsdf", make };
+pub const PLUGIN: Plugin<Arc<dyn Bsdf>> = Plugin { name: "mask", parameters: "opacity = 0.5, one nested bsdf", make };
 
 fn make(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Bsdf>> {
     let opacity = loader.texture(object, "opacity", Rgb::splat(0.5))?;

@@ -14,7 +14,7 @@ use crate::scene::texture::Texture;
 /// `normalmap`: red, green and blue in [0, 1] are the normal's x, y and z in [-1, 1]. Image files want `raw`.
 pub const PLUGIN: Plugin<Arc<dyn Bsdf>> = Plugin {
     name: "normalmap",
-    parameters: "normalmap, flip_invalid_normals, use_shadowing_function, one nested bsdf",
+    parameters: "normalmap, flip_invalid_normals = true, use_shadowing_function = true, one nested bsdf",
     make,
 };
 

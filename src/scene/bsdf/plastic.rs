@@ -14,7 +14,8 @@ use crate::scene::texture::Texture;
 /// `plastic`.
 pub const PLUGIN: Plugin<Arc<dyn Bsdf>> = Plugin {
     name: "plastic",
-    parameters: "int_ior, ext_ior, diffuse_reflectance, specular_reflectance, nonlinear",
+    parameters: "int_ior = polypropylene, ext_ior = air, diffuse_reflectance = 0.5, specular_reflectance = 1, \
+        nonlinear = false",
     make,
 };
 

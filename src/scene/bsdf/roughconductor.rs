@@ -14,8 +14,8 @@ use crate::scene::load::{Loader, Plugin};
 /// `roughconductor`.
 pub const PLUGIN: Plugin<Arc<dyn Bsdf>> = Plugin {
     name: "roughconductor",
-    parameters: "material, eta, k, specular_reflectance, alpha or alpha_u and alpha_v, distribution (beckmann, ggx), \
-        sample_visible (ignored)",
+    parameters: "material = none, eta, k, specular_reflectance = 1, alpha = 0.1 or alpha_u and alpha_v, \
+        distribution = beckmann (ggx), sample_visible (ignored)",
     make,
 };
 

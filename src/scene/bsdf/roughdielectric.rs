@@ -14,8 +14,8 @@ use crate::scene::texture::Texture;
 /// `roughdielectric`.
 pub const PLUGIN: Plugin<Arc<dyn Bsdf>> = Plugin {
     name: "roughdielectric",
-    parameters: "int_ior, ext_ior, specular_reflectance, specular_transmittance, alpha or alpha_u and alpha_v, \
-        distribution (beckmann, ggx), sample_visible (ignored)",
+    parameters: "int_ior = bk7, ext_ior = air, specular_reflectance = 1, specular_transmittance = 1, \
+        alpha = 0.1 or alpha_u and alpha_v, distribution = beckmann (ggx), sample_visible (ignored)",
     make,
 };
 

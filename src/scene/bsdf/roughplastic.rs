@@ -14,8 +14,8 @@ use crate::scene::load::{Loader, Plugin};
 /// `roughplastic`.
 pub const PLUGIN: Plugin<Arc<dyn Bsdf>> = Plugin {
     name: "roughplastic",
-    parameters: "int_ior, ext_ior, diffuse_reflectance, specular_reflectance, nonlinear, alpha, \
-        distribution (beckmann, ggx), sample_visible",
+    parameters: "int_ior = polypropylene, ext_ior = air, diffuse_reflectance = 0.5, specular_reflectance = 1, \
+        nonlinear = false, alpha = 0.1, distribution = beckmann (ggx), sample_visible (ignored)",
     make,
 };
 

@@ -13,7 +13,7 @@ use crate::scene::texture::Texture;
 /// `thindielectric`.
 pub const PLUGIN: Plugin<Arc<dyn Bsdf>> = Plugin {
     name: "thindielectric",
-    parameters: "int_ior, ext_ior, specular_reflectance, specular_transmittance",
+    parameters: "int_ior = bk7, ext_ior = air, specular_reflectance = 1, specular_transmittance = 1",
     make,
 };
 

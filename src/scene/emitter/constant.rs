@@ -10,7 +10,7 @@ use crate::scene::load::props::Object;
 use crate::scene::load::{Loader, Plugin};
 
 /// `constant`.
-pub const PLUGIN: Plugin<Box<dyn Emitter>> = Plugin { name: "constant", parameters: "radiance", make };
+pub const PLUGIN: Plugin<Box<dyn Emitter>> = Plugin { name: "constant", parameters: "radiance = 1", make };
 
 fn make(object: &Object, loader: &mut Loader) -> Result<Box<dyn Emitter>> {
     Ok(Box::new(Constant { radiance: loader.uniform_radiance(object, "radiance")?, area: 1.0 }))

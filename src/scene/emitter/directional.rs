@@ -11,7 +11,7 @@ use crate::scene::load::{Loader, Plugin};
 
 /// `directional`: shines along `direction`, or along +z of `to_world`.
 pub const PLUGIN: Plugin<Box<dyn Emitter>> =
-    Plugin { name: "directional", parameters: "direction or to_world, irradiance", make };
+    Plugin { name: "directional", parameters: "direction = +z or to_world, irradiance = 1", make };
 
 fn make(object: &Object, loader: &mut Loader) -> Result<Box<dyn Emitter>> {
     let along = object.transform("to_world")?.transform_vector3(Vec3::Z);

@@ -14,7 +14,7 @@ use crate::scene::texture::Texels;
 
 /// `envmap`.
 pub const PLUGIN: Plugin<Box<dyn Emitter>> =
-    Plugin { name: "envmap", parameters: "filename, scale, to_world, mis_compensation (ignored)", make };
+    Plugin { name: "envmap", parameters: "filename, scale = 1, to_world, mis_compensation (ignored)", make };
 
 fn make(object: &Object, loader: &mut Loader) -> Result<Box<dyn Emitter>> {
     let scale = object.float("scale", 1.0)?;

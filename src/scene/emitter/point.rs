@@ -10,7 +10,7 @@ use crate::scene::load::{Loader, Plugin};
 
 /// `point`.
 pub const PLUGIN: Plugin<Box<dyn Emitter>> =
-    Plugin { name: "point", parameters: "position or to_world, intensity", make };
+    Plugin { name: "point", parameters: "position = 0 or to_world, intensity = 1", make };
 
 fn make(object: &Object, loader: &mut Loader) -> Result<Box<dyn Emitter>> {
     let origin = object.transform("to_world")?.transform_point3(Vec3::ZERO);

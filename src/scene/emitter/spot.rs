@@ -11,8 +11,11 @@ use crate::scene::load::{Loader, Plugin};
 use crate::scene::texture::{self, Texture};
 
 /// `spot`: shines along +z of `to_world`. Angles are in degrees, from the axis.
-pub const PLUGIN: Plugin<Box<dyn Emitter>> =
-    Plugin { name: "spot", parameters: "intensity, texture, cutoff_angle, beam_width, to_world", make };
+pub const PLUGIN: Plugin<Box<dyn Emitter>> = Plugin {
+    name: "spot",
+    parameters: "intensity = 1, texture, cutoff_angle = 20, beam_width = 3/4 cutoff_angle, to_world",
+    make,
+};
 
 fn make(object: &Object, loader: &mut Loader) -> Result<Box<dyn Emitter>> {
     let cutoff = object.float("cutoff_angle", 20.0)?;

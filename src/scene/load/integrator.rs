@@ -7,7 +7,7 @@ use crate::scene::Integrator;
 
 /// Plugins and what they take.
 pub const PLUGINS: &[(&str, &str)] = &[
-    ("path", "max_depth, rr_depth, hide_emitters"),
+    ("path", "max_depth = -1, rr_depth = 5, hide_emitters = false"),
     ("volpath", "as path; scenes have no media"),
     ("volpathmis", "as path; scenes have no media"),
     ("direct", "as path with max_depth 2; emitter_samples, bsdf_samples, shading_samples (ignored)"),

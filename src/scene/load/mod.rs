@@ -123,11 +123,37 @@ pub fn load(path: &Path, options: &Options) -> Result<Scene> {
     })
 }
 
-/// The table's row for an object, or an error that lists the table.
+/// Plugins of Mitsuba 3 that are left out, and why or what to use instead.
+pub const UNSUPPORTED: &[(&str, &str, &str)] = &[
+    ("emitter", "sunsky", "bake it into an envmap; its tables of measured skies are not at hand"),
+    ("emitter", "directionalarea", "paths from the camera never meet its parallel light; use a spot or an area"),
+    ("emitter", "projector", "use a spot with a texture"),
+    ("bsdf", "hair", "curves are not traced"),
+    ("bsdf", "measured", "measured materials are not read; principled comes near"),
+    ("bsdf", "polarizer", "light is not polarised here"),
+    ("bsdf", "retarder", "light is not polarised here"),
+    ("bsdf", "circular", "light is not polarised here"),
+    ("bsdf", "pplastic", "light is not polarised here; use roughplastic"),
+    ("shape", "bsplinecurve", "curves are not traced; export them as a mesh"),
+    ("shape", "linearcurve", "curves are not traced; export them as a mesh"),
+    ("shape", "sdfgrid", "distance fields are not traced; export them as a mesh"),
+    ("shape", "ellipsoids", "splats are not traced"),
+    ("shape", "ellipsoidsmesh", "splats are not traced"),
+    ("texture", "volume", "volumes are not supported"),
+];
+
+/// The table's row for an object, or an error that says what to do.
 pub fn find<'a, T>(table: &'a [Plugin<T>], object: &Object) -> Result<&'a Plugin<T>> {
     table.iter().find(|plugin| plugin.name == object.plugin).ok_or_else(|| {
-        let names: Vec<_> = table.iter().map(|plugin| plugin.name).collect();
-        let what = format!("{} `{}` is not known; there are {}", object.class, object.plugin, names.join(", "));
+        let (class, plugin) = (&object.class, &object.plugin);
+        let reason = UNSUPPORTED.iter().find(|(other, name, _)| other == class && name == plugin);
+        let what = match reason {
+            Some((.., reason)) => format!("{class} `{plugin}` is not supported: {reason}"),
+            None => {
+                let names: Vec<_> = table.iter().map(|plugin| plugin.name).collect();
+                format!("{class} `{plugin}` is not known; there are {}", names.join(", "))
+            }
+        };
         object.place.unsupported(what)
     })
 }

@@ -40,14 +40,18 @@ enum Projection {
     Parallel,
 }
 
-const VIEW: &str = "fov, focal_length, fov_axis (x, y, diagonal, smaller, larger), to_world, near_clip, far_clip, \
-    principal_point_offset_x, principal_point_offset_y, film, sampler";
-const LENS: &str = "aperture_radius, focus_distance, fov, focal_length, fov_axis (x, y, diagonal, smaller, larger), \
-    to_world, near_clip, far_clip, principal_point_offset_x, principal_point_offset_y, film, sampler";
+const VIEW: &str = "fov or focal_length = 50mm, fov_axis = x (y, diagonal, smaller, larger), to_world, near_clip = 0.01, \
+    far_clip = 10000, principal_point_offset_x = 0, principal_point_offset_y = 0, film, sampler";
+const LENS: &str = "aperture_radius, focus_distance = far_clip, fov or focal_length = 50mm, \
+    fov_axis = x (y, diagonal, smaller, larger), to_world, near_clip = 0.01, far_clip = 10000, \
+    principal_point_offset_x = 0, principal_point_offset_y = 0, film, sampler";
 
 /// Plugins and what they take.
-pub const PLUGINS: &[(&str, &str)] =
-    &[("perspective", VIEW), ("thinlens", LENS), ("orthographic", "to_world, near_clip, far_clip, film, sampler")];
+pub const PLUGINS: &[(&str, &str)] = &[
+    ("perspective", VIEW),
+    ("thinlens", LENS),
+    ("orthographic", "to_world, near_clip = 0.01, far_clip = 10000, film, sampler"),
+];
 
 /// Builds the sensor; `size` overrides the film's.
 pub fn load(object: &Object, loader: &mut Loader, size: Option<(usize, usize)>, max_pixels: u64) -> Result<Sensor> {

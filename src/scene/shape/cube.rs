@@ -8,7 +8,7 @@ use crate::scene::load::props::Object;
 use crate::scene::load::{Loader, MeshData, Plugin};
 
 /// `cube`.
-pub const PLUGIN: Plugin<Geometry> = Plugin { name: "cube", parameters: "to_world, flip_normals", make };
+pub const PLUGIN: Plugin<Geometry> = Plugin { name: "cube", parameters: "to_world, flip_normals = false", make };
 
 /// Outward normal, then the direction from the face's first corner to its second and to its fourth.
 const FACES: [[Vec3; 3]; 6] = [

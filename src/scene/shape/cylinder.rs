@@ -13,7 +13,7 @@ use crate::scene::{Ray, Surface, texture};
 
 /// `cylinder`: from `p0` to `p1`, then `to_world`.
 pub const PLUGIN: Plugin<Geometry> =
-    Plugin { name: "cylinder", parameters: "p0, p1, radius, to_world, flip_normals", make };
+    Plugin { name: "cylinder", parameters: "p0 = 0, p1 = +z, radius = 1, to_world, flip_normals = false", make };
 
 fn make(object: &Object, loader: &mut Loader) -> Result<Geometry> {
     let (p0, p1) = (object.vector("p0", Vec3::ZERO)?, object.vector("p1", Vec3::Z)?);

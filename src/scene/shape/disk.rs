@@ -12,7 +12,7 @@ use crate::scene::load::{Loader, Plugin};
 use crate::scene::{Ray, Surface, texture};
 
 /// `disk`: the unit disk in the plane z = 0, facing +z; an ellipse when scaled unevenly.
-pub const PLUGIN: Plugin<Geometry> = Plugin { name: "disk", parameters: "to_world, flip_normals", make };
+pub const PLUGIN: Plugin<Geometry> = Plugin { name: "disk", parameters: "to_world, flip_normals = false", make };
 
 fn make(object: &Object, loader: &mut Loader) -> Result<Geometry> {
     let to_world = object.transform("to_world")?;

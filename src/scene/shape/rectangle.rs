@@ -8,7 +8,7 @@ use crate::scene::load::props::Object;
 use crate::scene::load::{Loader, MeshData, Plugin};
 
 /// `rectangle`.
-pub const PLUGIN: Plugin<Geometry> = Plugin { name: "rectangle", parameters: "to_world, flip_normals", make };
+pub const PLUGIN: Plugin<Geometry> = Plugin { name: "rectangle", parameters: "to_world, flip_normals = false", make };
 
 fn make(object: &Object, loader: &mut Loader) -> Result<Geometry> {
     let to_world = object.transform("to_world")?;

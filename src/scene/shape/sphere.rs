@@ -13,7 +13,7 @@ use crate::scene::{Ray, Surface, texture};
 
 /// `sphere`: centre and radius, then `to_world`.
 pub const PLUGIN: Plugin<Geometry> =
-    Plugin { name: "sphere", parameters: "center, radius, to_world, flip_normals", make };
+    Plugin { name: "sphere", parameters: "center = 0, radius = 1, to_world, flip_normals = false", make };
 
 fn make(object: &Object, loader: &mut Loader) -> Result<Geometry> {
     let center = object.vector("center", Vec3::ZERO)?;

@@ -11,7 +11,7 @@ use crate::scene::load::{Loader, Plugin};
 /// `bitmap`. An alpha channel is not used.
 pub const PLUGIN: Plugin<Arc<dyn Texture>> = Plugin {
     name: "bitmap",
-    parameters: "filename, filter_type (bilinear, nearest), wrap_mode (repeat, mirror, clamp), raw, to_uv, \
+    parameters: "filename, filter_type = bilinear (nearest), wrap_mode = repeat (mirror, clamp), raw = false, to_uv, \
         format, accel (both ignored)",
     make,
 };

@@ -9,7 +9,8 @@ use crate::scene::load::props::Object;
 use crate::scene::load::{Loader, Plugin};
 
 /// `checkerboard`.
-pub const PLUGIN: Plugin<Arc<dyn Texture>> = Plugin { name: "checkerboard", parameters: "color0, color1, to_uv", make };
+pub const PLUGIN: Plugin<Arc<dyn Texture>> =
+    Plugin { name: "checkerboard", parameters: "color0 = 0.4, color1 = 0.2, to_uv", make };
 
 fn make(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Texture>> {
     Ok(Arc::new(Checkerboard {

@@ -10,7 +10,7 @@ use crate::scene::load::{Loader, Plugin};
 use crate::scene::shape::Geometry;
 
 /// `mesh_attribute`: `name` starts with `vertex_` or `face_`.
-pub const PLUGIN: Plugin<Arc<dyn Texture>> = Plugin { name: "mesh_attribute", parameters: "name, scale", make };
+pub const PLUGIN: Plugin<Arc<dyn Texture>> = Plugin { name: "mesh_attribute", parameters: "name, scale = 1", make };
 
 fn make(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Texture>> {
     let name = object.string("name", "")?;

@@ -9,9 +9,9 @@ use crate::scene::load::props::{Object, Property, Value};
 use crate::scene::load::{Loader, Plugin};
 
 /// `uniform`.
-pub const UNIFORM: Plugin<Arc<dyn Texture>> = Plugin { name: "uniform", parameters: "value", make };
+pub const UNIFORM: Plugin<Arc<dyn Texture>> = Plugin { name: "uniform", parameters: "value = 1", make };
 /// `rawconstant`: a number or three that are no colour, such as a direction.
-pub const RAW: Plugin<Arc<dyn Texture>> = Plugin { name: "rawconstant", parameters: "value", make };
+pub const RAW: Plugin<Arc<dyn Texture>> = Plugin { name: "rawconstant", parameters: "value = 1", make };
 
 fn make(object: &Object, _loader: &mut Loader) -> Result<Arc<dyn Texture>> {
     let value = match object.get("value") {

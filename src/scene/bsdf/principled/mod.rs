@@ -18,8 +18,9 @@ use crate::scene::texture::Texture;
 /// `principled`.
 pub const PLUGIN: Plugin<Arc<dyn Bsdf>> = Plugin {
     name: "principled",
-    parameters: "base_color, roughness, anisotropic, metallic, spec_trans, eta or specular, spec_tint, sheen, \
-        sheen_tint, flatness, clearcoat, clearcoat_gloss, main_specular_sampling_rate, clearcoat_sampling_rate, \
+    parameters: "base_color = 0.5, roughness = 0.5, anisotropic = 0, metallic = 0, spec_trans = 0, \
+        eta or specular = 0.5, spec_tint = 0, sheen = 0, sheen_tint = 0, flatness = 0, clearcoat = 0, \
+        clearcoat_gloss = 0, main_specular_sampling_rate, clearcoat_sampling_rate, \
         diffuse_reflectance_sampling_rate (all three ignored)",
     make,
 };

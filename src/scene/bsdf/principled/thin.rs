@@ -16,8 +16,8 @@ use crate::scene::texture::Texture;
 /// `principledthin`.
 pub const PLUGIN: Plugin<Arc<dyn Bsdf>> = Plugin {
     name: "principledthin",
-    parameters: "base_color, roughness, anisotropic, spec_trans, eta, spec_tint, sheen, sheen_tint, flatness, \
-        diff_trans (0 to 2), specular_reflectance_sampling_rate, specular_transmittance_sampling_rate, \
+    parameters: "base_color = 0.5, roughness = 0.5, anisotropic = 0, spec_trans = 0, eta = 1.5, spec_tint = 0, \
+        sheen = 0, sheen_tint = 0, flatness = 0, diff_trans = 0 (to 2), specular_reflectance_sampling_rate, specular_transmittance_sampling_rate, \
         diffuse_reflectance_sampling_rate, diffuse_transmittance_sampling_rate (all four ignored)",
     make,
 };
