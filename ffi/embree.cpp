@@ -194,17 +194,6 @@ uint32_t fluxion_scene_add_instance(void *device, void *scene, void *child, cons
 
 void fluxion_scene_commit(void *scene) { rtcCommitScene(scene_of(scene)); }
 
-void fluxion_scene_bounds(void *scene, float lower[3], float upper[3]) {
-  RTCBounds bounds;
-  rtcGetSceneBounds(scene_of(scene), &bounds);
-  lower[0] = bounds.lower_x;
-  lower[1] = bounds.lower_y;
-  lower[2] = bounds.lower_z;
-  upper[0] = bounds.upper_x;
-  upper[1] = bounds.upper_y;
-  upper[2] = bounds.upper_z;
-}
-
 void fluxion_scene_release(void *scene) { rtcReleaseScene(scene_of(scene)); }
 
 bool fluxion_intersect(void *scene, const FluxionRay *ray, FluxionHit *hit) {
@@ -226,9 +215,6 @@ bool fluxion_intersect(void *scene, const FluxionRay *ray, FluxionHit *hit) {
   hit->geometry = query.hit.geomID;
   hit->primitive = query.hit.primID;
   hit->instance = query.hit.instID[0];
-  hit->normal[0] = query.hit.Ng_x;
-  hit->normal[1] = query.hit.Ng_y;
-  hit->normal[2] = query.hit.Ng_z;
   return true;
 }
 

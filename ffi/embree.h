@@ -21,8 +21,7 @@ typedef struct FluxionRay {
 } FluxionRay;
 
 /* Barycentric u and v weigh the second and the third vertex; for other shapes they are unused.
- * `instance` is the identifier of the instance that was entered, or FLUXION_NO_INSTANCE.
- * `normal` is not normalised. */
+ * `instance` is the identifier of the instance that was entered, or FLUXION_NO_INSTANCE. */
 #define FLUXION_NO_INSTANCE 0xffffffffu
 
 typedef struct FluxionHit {
@@ -32,7 +31,6 @@ typedef struct FluxionHit {
   uint32_t geometry;
   uint32_t primitive;
   uint32_t instance;
-  float normal[3];
 } FluxionHit;
 
 typedef enum FluxionQuadricKind {
@@ -66,7 +64,6 @@ uint32_t fluxion_scene_add_quadric(void *device, void *scene, const FluxionQuadr
 /* Another, committed scene of the same device, placed by 16 floats column by column. */
 uint32_t fluxion_scene_add_instance(void *device, void *scene, void *child, const float to_world[16]);
 void fluxion_scene_commit(void *scene);
-void fluxion_scene_bounds(void *scene, float lower[3], float upper[3]);
 void fluxion_scene_release(void *scene);
 
 bool fluxion_intersect(void *scene, const FluxionRay *ray, FluxionHit *hit);

@@ -61,6 +61,8 @@ extern "C" void *fluxion_image_open(const char *path, FluxionImageSpec *spec, Fl
   spec->width = found.width;
   spec->height = found.height;
   spec->channels = found.nchannels;
+  spec->x = found.x;
+  spec->y = found.y;
   spec->eight_bit = found.format == OIIO::TypeDesc::UINT8;
   return image.release();
 } catch (const std::exception &exception) {

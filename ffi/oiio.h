@@ -19,6 +19,9 @@ typedef struct FluxionImageSpec {
   int width;
   int height;
   int channels;
+  /* Upper left corner of the pixels that are there. */
+  int x;
+  int y;
   /* Whether every sample is stored in eight bits. */
   bool eight_bit;
 } FluxionImageSpec;
@@ -47,7 +50,7 @@ void *fluxion_texture_system_new(int megabytes);
 void fluxion_texture_system_release(void *system);
 /* A file of a system, which keeps it. Null on failure. */
 void *fluxion_texture_open(void *system, const char *path, FluxionError *error);
-/* The samples of one pixel of an open file, from the first channel on. False when it cannot be read. */
+/* The samples of one pixel of an open file, by its place in the file, from the first channel on. False when it cannot be read. */
 bool fluxion_texture_texel(void *system, void *texture, int x, int y, int channels, float *samples);
 
 #ifdef __cplusplus

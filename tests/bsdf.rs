@@ -50,6 +50,10 @@ const CASES: &[(&str, &str)] = &[
     ),
     ("null", r#"<bsdf type="null"/>"#),
     (
+        "mask",
+        r#"<bsdf type="mask"><float name="opacity" value="0.6"/><bsdf type="blendbsdf"><float name="weight" value="0.4"/><bsdf type="thindielectric"/><bsdf type="null"/></bsdf></bsdf>"#,
+    ),
+    (
         "normalmap",
         r#"<bsdf type="normalmap"><texture type="rawconstant" name="normalmap"><vector name="value" value="0.6,0.55,0.95"/></texture><bsdf type="roughplastic"><float name="alpha" value="0.3"/></bsdf></bsdf>"#,
     ),

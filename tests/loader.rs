@@ -56,6 +56,20 @@ fn mistakes_are_named_with_their_line() {
         ("CAMERA<emitter type=\"spot\"><float name=\"cutoff_angle\" value=\"100\"/></emitter>", "a cone of 100"),
         ("<emitter type=\"sunsky\"/>", "`sunsky` is not supported: bake it"),
         ("<shape type=\"instance\"/>", "needs exactly one shapegroup"),
+        ("<shape type=\"merge\"><transform name=\"to_world\"/></shape>", "has no property `to_world`"),
+        ("<shape type=\"sphere\"><emitter type=\"area\"/><emitter type=\"area\"/></shape>", "a second emitter"),
+        (
+            "<bsdf type=\"diffuse\" id=\"a\"/><bsdf type=\"null\" id=\"b\"/><alias id=\"a\" as=\"b\"/>",
+            "the id `b` is given twice",
+        ),
+        (
+            "<emitter type=\"directional\"><transform name=\"to_world\"/><vector name=\"direction\" value=\"0,0,1\"/></emitter>",
+            "either `direction` or `to_world`",
+        ),
+        (
+            "<shape type=\"cylinder\"><transform name=\"to_world\"><matrix value=\"1 0 1  0 1 0  0 0 1\"/></transform></shape>",
+            "a cylinder that is sheared",
+        ),
         (
             "<shape type=\"instance\"><shape type=\"shapegroup\"><shape type=\"sphere\"><emitter type=\"area\"/></shape></shape></shape>",
             "an emitter in a shapegroup",
@@ -93,6 +107,15 @@ fn mistakes_are_named_with_their_line() {
 fn files_that_blow_up_are_refused() {
     let nested = "<bsdf type=\"twosided\">".repeat(5000) + &"</bsdf>".repeat(5000);
     assert!(message(&nested).contains("nested more than"));
+    // Every level of blending names the one below twice.
+    let mut blends = String::from("<bsdf type=\"diffuse\" id=\"b0\"/>");
+    for level in 1..25 {
+        let below = format!("<ref id=\"b{}\"/>", level - 1);
+        blends += &format!(
+            "<bsdf type=\"blendbsdf\" id=\"b{level}\"><float name=\"weight\" value=\"0.5\"/>{below}{below}</bsdf>"
+        );
+    }
+    assert!(message(&format!("{blends}<shape type=\"sphere\"><ref id=\"b24\"/></shape>")).contains("more than 1000"));
     let mut doubling = String::from("<default name=\"p0\" value=\"xxxxxxxx\"/>");
     (0..40).for_each(|i| doubling += &format!("<default name=\"p{}\" value=\"$p{i}$p{i}\"/>", i + 1));
     assert!(message(&doubling).contains("longer than"));

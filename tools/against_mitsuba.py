@@ -73,7 +73,17 @@ def public_scenes(scenes, references):
             for scene in (f for f in os.listdir(os.path.dirname(folder)) if f.startswith(stem + "_") and f.endswith(".xml")):
                 if scene[len(stem) + 1:-4] in ("path", "direct"):
                     path = os.path.join(folder, file)
-                    yield stem, os.path.join(os.path.dirname(folder), scene), path, path[:-4] + "_var.exr", True
+                    name = stem.removeprefix("test_") if stem != "scene" else os.path.basename(os.path.dirname(folder))
+                    yield name, os.path.join(os.path.dirname(folder), scene), path, path[:-4] + "_var.exr", True
+
+
+def fresh(path, size, spp=512, runs=8):
+    """Mean and variance of the mean of Mitsuba's own renders."""
+    import mitsuba as mi
+    mi.set_variant("llvm_ad_rgb")
+    scene = mitsuba_scene(mi, path, size)
+    images = [np.array(mi.render(scene, spp=spp, seed=10 + s), dtype=np.float64)[..., :3] for s in range(runs)]
+    return np.mean(images, 0), np.var(images, 0, ddof=1) / runs
 
 
 def radiance(scenes, references, spp="512", only=""):
@@ -86,6 +96,10 @@ def radiance(scenes, references, spp="512", only=""):
             continue
         expected, theirs = rgb(read(reference)), rgb(read(variance))
         samples = 4 * int(spp) if of_sample else int(spp)
+        if name == "texture_interp":
+            # Its reference was filtered with a Gaussian: a new one is rendered.
+            expected, theirs = fresh(scene, expected.shape[1::-1])
+            of_sample = False
         try:
             _, layers, stats = fluxion(scene, expected.shape[1::-1], samples, "primal")
         except subprocess.CalledProcessError:
@@ -197,18 +211,15 @@ def speed(scenes, spp="8"):
 
 def bundled(spp="1024"):
     """Our own scenes, rendered by both."""
-    import mitsuba as mi
-    mi.set_variant("llvm_ad_rgb")
     print("| scene | mean ratio R G B | standard error | z rms | beyond 4 |\n|---|---|---|---|---|")
     names = ["unit/" + n for n in sorted(os.listdir("scenes/unit")) if os.path.exists("scenes/unit/%s/scene.xml" % n)]
     for name in ["cornell-box", "door-ajar", "glossy-metal", "glass-caustic"] + names:
         path, size = "scenes/%s/scene.xml" % name, (32, 24) if name == "unit/orthographic" else (64, 48)
         _, layers, _ = fluxion(path, size, int(spp), "primal")
-        scene = mitsuba_scene(mi, path, size)
-        runs = np.stack([np.array(mi.render(scene, spp=int(spp) // 8, seed=10 + s), dtype=np.float64)[..., :3] for s in range(8)])
+        expected, theirs = fresh(path, size, int(spp) // 8)
         mean = rgb(layers) + rgb(layers, "direct.")
         variance = rgb(layers, "variance.") + rgb(layers, "direct_variance.")
-        z_row(name, mean, variance, runs.mean(0), runs.var(0, ddof=1) / 8)
+        z_row(name, mean, variance, expected, theirs)
 
 
 if __name__ == "__main__":

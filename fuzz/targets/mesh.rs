@@ -13,5 +13,9 @@ fuzz_target!(|bytes: &[u8]| {
         let count = mesh.positions.len();
         assert!(mesh.triangles.iter().flatten().all(|&vertex| (vertex as usize) < count));
         assert!([mesh.normals.len(), mesh.uvs.len()].iter().all(|&n| n == 0 || n == count));
+        for (name, values) in &mesh.attributes {
+            let expected = if name.starts_with("face_") { mesh.triangles.len() } else { count };
+            assert_eq!(values.len(), expected, "{name}");
+        }
     }
 });

@@ -262,14 +262,6 @@ impl Committed {
         // SAFETY: as above.
         unsafe { raw::fluxion_occluded(self.0.raw, ray) }
     }
-
-    /// Lower and upper corner of the scene's box; the lower is above the upper when it is empty.
-    pub fn bounds(&self) -> ([f32; 3], [f32; 3]) {
-        let (mut lower, mut upper) = ([0.0; 3], [0.0; 3]);
-        // SAFETY: the scene is committed; the arrays hold three floats each.
-        unsafe { raw::fluxion_scene_bounds(self.0.raw, lower.as_mut_ptr(), upper.as_mut_ptr()) }
-        (lower, upper)
-    }
 }
 
 #[cfg(test)]

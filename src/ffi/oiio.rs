@@ -57,6 +57,8 @@ pub struct ImageFile<'a> {
     pub width: usize,
     /// Number of rows.
     pub height: usize,
+    /// Place of the first pixel in the file.
+    pub origin: (i32, i32),
     /// Channel names, in the order of the file.
     pub channels: Vec<String>,
     /// Whether the file holds eight bits a sample.
@@ -101,8 +103,8 @@ impl<'a> ImageFile<'a> {
             return Err(Error::io(path, message(&error)));
         }
         let [width, height] = [spec.width, spec.height].map(|n| usize::try_from(n).unwrap_or(0));
-        let eight_bit = spec.eight_bit;
-        let mut file = Self { width, height, channels: Vec::new(), eight_bit, path, handle };
+        let (origin, eight_bit) = ((spec.x, spec.y), spec.eight_bit);
+        let mut file = Self { width, height, origin, channels: Vec::new(), eight_bit, path, handle };
         file.channels = (0..spec.channels)
             // SAFETY: the handle is open; the string lives as long.
             .map(|index| unsafe { owned(raw::fluxion_image_channel(handle, index)) }.unwrap_or_default())
@@ -203,9 +205,9 @@ impl CachedTexture {
         Ok(Self { system: Arc::clone(system), texture })
     }
 
-    /// The first samples of a pixel, at most `samples.len()`; zero where the file can no longer be read.
-    pub fn texel(&self, x: usize, y: usize, samples: &mut [f32]) {
-        let (x, y, count) = (x as i32, y as i32, samples.len() as i32);
+    /// The first samples of a pixel by its place in the file; zero where the file can no longer be read.
+    pub fn texel(&self, x: i32, y: i32, samples: &mut [f32]) {
+        let count = samples.len() as i32;
         // SAFETY: the system is alive, the texture is one of its own, and `samples` has room for `count` floats.
         if !unsafe { raw::fluxion_texture_texel(self.system.0, self.texture, x, y, count, samples.as_mut_ptr()) } {
             samples.fill(0.0);
@@ -223,6 +225,8 @@ pub fn write(path: &Path, pixels: &Pixels, kind: Kind, compression: Option<&str>
         width: size(pixels.width)?,
         height: size(pixels.height)?,
         channels: size(pixels.channels.len())?,
+        x: 0,
+        y: 0,
         eight_bit: kind == Kind::Uint8,
     };
     let channels = pixels.channels.iter().map(|channel| c_string(channel)).collect::<Result<Vec<_>>>()?;

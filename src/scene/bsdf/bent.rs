@@ -105,6 +105,10 @@ impl<B: Bend> Bsdf for Bent<B> {
         self.nested.transmits()
     }
 
+    fn refraction(&self) -> Option<f32> {
+        self.nested.refraction()
+    }
+
     fn needs_derivatives(&self) -> bool {
         true
     }

@@ -30,7 +30,7 @@ impl Metal {
     pub fn load(object: &Object, loader: &mut Loader) -> Result<Self> {
         let names = metals::names();
         let (eta, k) = metals::index_of_refraction(object.choice("material", &names, metals::NONE)?);
-        let (eta, k) = (object.color("eta", eta)?, object.color("k", k)?);
+        let (eta, k) = (object.index("eta", eta)?, object.index("k", k)?);
         Ok(Self { eta, k, reflectance: loader.texture(object, "specular_reflectance", Rgb::ONE)? })
     }
 

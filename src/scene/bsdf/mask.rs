@@ -34,9 +34,13 @@ impl Bsdf for Mask {
         let opacity = self.opacity(surface);
         if lobe < opacity {
             let sample = self.nested.sample(surface, wi, lobe / opacity, u)?;
-            return Some(BsdfSample { pdf: sample.pdf * opacity, ..sample });
+            if sample.lobe != Lobe::Null {
+                return Some(BsdfSample { pdf: sample.pdf * opacity, ..sample });
+            }
         }
-        Some(BsdfSample { wo: -wi, weight: Rgb::ONE, pdf: 1.0 - opacity, lobe: Lobe::Null, eta: 1.0 })
+        // Through a hole or through what is nested: one and the same way.
+        let Delta { wo, value, probability } = self.delta(surface, wi, Lobe::Null)?;
+        Some(BsdfSample { wo, weight: value / probability, pdf: probability, lobe: Lobe::Null, eta: 1.0 })
     }
 
     fn eval(&self, surface: &Surface, wi: Vec3, wo: Vec3) -> Eval {
@@ -47,12 +51,12 @@ impl Bsdf for Mask {
 
     fn delta(&self, surface: &Surface, wi: Vec3, lobe: Lobe) -> Option<Delta> {
         let opacity = self.opacity(surface);
-        if lobe == Lobe::Null {
-            let through = 1.0 - opacity;
-            return (through > 0.0).then_some(Delta { wo: -wi, value: Rgb::splat(through), probability: through });
-        }
-        let Delta { wo, value, probability } = self.nested.delta(surface, wi, lobe)?;
-        (opacity > 0.0).then_some(Delta { wo, value: value * opacity, probability: probability * opacity })
+        let nested = self.nested.delta(surface, wi, lobe).filter(|_| opacity > 0.0);
+        let nested = nested.map(|delta| (delta.wo, delta.value * opacity, delta.probability * opacity));
+        let hole = if lobe == Lobe::Null { 1.0 - opacity } else { 0.0 };
+        let (wo, value, probability) = nested.unwrap_or((-wi, Rgb::ZERO, 0.0));
+        let (value, probability) = (value + hole, probability + hole);
+        (probability > 0.0).then_some(Delta { wo, value, probability })
     }
 
     fn roughness(&self, surface: &Surface) -> Option<f32> {

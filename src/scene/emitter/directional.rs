@@ -14,6 +14,9 @@ pub const PLUGIN: Plugin<Box<dyn Emitter>> =
     Plugin { name: "directional", parameters: "direction = +z or to_world, irradiance = 1", make };
 
 fn make(object: &Object, loader: &mut Loader) -> Result<Box<dyn Emitter>> {
+    if object.get("direction").is_some() && object.get("to_world").is_some() {
+        return Err(object.place_of("direction").invalid("give either `direction` or `to_world`"));
+    }
     let along = object.transform("to_world")?.transform_vector3(Vec3::Z);
     let direction = object.vector("direction", along)?.try_normalize();
     let direction = direction.ok_or_else(|| object.place_of("direction").invalid("`direction` has length zero"))?;

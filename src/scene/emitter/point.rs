@@ -13,6 +13,9 @@ pub const PLUGIN: Plugin<Box<dyn Emitter>> =
     Plugin { name: "point", parameters: "position = 0 or to_world, intensity = 1", make };
 
 fn make(object: &Object, loader: &mut Loader) -> Result<Box<dyn Emitter>> {
+    if object.get("position").is_some() && object.get("to_world").is_some() {
+        return Err(object.place_of("position").invalid("give either `position` or `to_world`"));
+    }
     let origin = object.transform("to_world")?.transform_point3(Vec3::ZERO);
     let position = object.vector("position", origin)?;
     Ok(Box::new(Point { position, intensity: loader.uniform_radiance(object, "intensity")? }))

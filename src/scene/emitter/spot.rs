@@ -68,7 +68,8 @@ impl Emitter for Spot {
     }
 
     fn power(&self) -> f32 {
-        let cone = TAU * (1.0 - (0.5 * (self.cutoff + self.beam)).cos());
+        // 1 - cos α as 2 sin² α/2: the narrowest cone has some power.
+        let cone = 2.0 * TAU * (0.25 * (self.cutoff + self.beam)).sin().powi(2);
         cone * self.intensity.max_element().max(0.0) * self.slide.mean().max(0.0)
     }
 

@@ -6,10 +6,12 @@ use std::sync::Arc;
 use super::props::Object;
 use super::{Loader, find};
 use crate::error::Result;
-use crate::math::Mat4;
 use crate::scene::emitter::{self, Emitter};
 use crate::scene::shape;
-use crate::scene::{Group, Shape, bsdf};
+use crate::scene::{Bounds, Group, Shape, bsdf};
+
+/// More shapes than this are taken for a mistake, such as merges of merges of merges.
+const MAX_SHAPES: usize = 1 << 20;
 
 /// What has been found so far.
 #[derive(Default)]
@@ -59,8 +61,13 @@ impl Contents {
             // Drawn by its instances only.
             "shapegroup" => Ok(()),
             "merge" => loader.guarded(object, |loader| {
-                children(object, loader)?.iter().try_for_each(|child| self.shape(child, loader))
+                let children = children(object, loader)?;
+                object.all_used("nested shapes")?;
+                children.iter().try_for_each(|child| self.shape(child, loader))
             }),
+            _ if self.shapes.len() >= MAX_SHAPES => {
+                Err(object.place.invalid(format!("more than {MAX_SHAPES} shapes: use instances, or larger meshes")))
+            }
             _ => {
                 let number = (self.shapes.len() as u32, self.emitters.len() as u32);
                 if let Some((shape, emitter)) = single(object, loader, number)? {
@@ -82,13 +89,17 @@ impl Contents {
             return Err(group.place.invalid(format!("an instance of `{}`; it takes a shapegroup", group.plugin)));
         }
         object.all_used("to_world, one shapegroup")?;
-        let place = self.group(group, loader)?;
-        place.push(to_world);
+        let group = self.group(group, loader)?;
+        let bounds = group.shapes.iter().fold(Bounds::EMPTY, |all, shape| all.union(shape.geometry.bounds()));
+        if !bounds.transformed(to_world).is_finite() {
+            return Err(object.place.invalid("coordinates are not finite"));
+        }
+        group.placements.push(to_world);
         Ok(())
     }
 
-    /// Where a group is placed; its shapes are made when it is first asked for.
-    fn group(&mut self, object: &Rc<Object>, loader: &mut Loader) -> Result<&mut Vec<Mat4>> {
+    /// A group, whose shapes are made when it is first asked for.
+    fn group(&mut self, object: &Rc<Object>, loader: &mut Loader) -> Result<&mut Group> {
         let groups = &mut self.groups.0;
         let found = groups.iter().position(|(origin, _)| *origin == Rc::as_ptr(object));
         let index = match found {
@@ -111,7 +122,7 @@ impl Contents {
                 groups.len() - 1
             }
         };
-        Ok(&mut groups[index].1.placements)
+        Ok(&mut groups[index].1)
     }
 }
 
@@ -143,6 +154,9 @@ fn single(object: &Object, loader: &mut Loader, (shape_number, emitter_number): 
         match nested.class.as_str() {
             "bsdf" if bsdf.is_some() => return Err(nested.place.invalid("a second bsdf; a shape has one")),
             "bsdf" => bsdf = Some(loader.bsdf(&nested)?),
+            "emitter" if radiance.is_some() => {
+                return Err(nested.place.invalid("a second emitter; a shape has one"));
+            }
             "emitter" if nested.plugin == "area" => {
                 radiance = Some(loader.radiance(&nested, "radiance")?);
                 nested.ignore(&["sampling_weight"]);

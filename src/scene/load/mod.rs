@@ -28,6 +28,8 @@ use crate::math::{Rgb, rng};
 
 /// Nesting deeper than this (a BSDF in a BSDF in ...) is taken for a loop of references.
 const MAX_NESTING: usize = 32;
+/// Materials and textures built from more objects than this are taken for a mistake.
+const MAX_COST: usize = 1000;
 /// Films with more pixels than this are taken for a mistake.
 const MAX_PIXELS: u64 = 1 << 28;
 
@@ -63,12 +65,15 @@ pub struct Plugin<T: 'static> {
 /// Builds objects, each shared one once.
 pub struct Loader {
     tree: xml::Tree,
-    bsdfs: HashMap<*const Object, Arc<dyn Bsdf>>,
-    textures: HashMap<*const Object, Arc<dyn Texture>>,
+    /// What has been built, with the number of objects that it goes through.
+    bsdfs: HashMap<*const Object, (Arc<dyn Bsdf>, usize)>,
+    textures: HashMap<*const Object, (Arc<dyn Texture>, usize)>,
     bitmaps: HashMap<PathBuf, Arc<texture::Texels>>,
     texture_memory: texture::Memory,
     meshes: HashMap<PathBuf, Vec<u8>>,
     nesting: usize,
+    /// Objects that what is being built goes through so far.
+    cost: usize,
     /// Textures that need to know all shapes.
     pub attributes: Vec<texture::Unbound>,
 }
@@ -87,6 +92,7 @@ pub fn load(path: &Path, options: &Options) -> Result<Scene> {
         texture_memory: texture::Memory::new(options.texture_memory),
         meshes: HashMap::new(),
         nesting: 0,
+        cost: 0,
         attributes: Vec::new(),
     };
     let mut contents = Contents::default();
@@ -112,10 +118,8 @@ pub fn load(path: &Path, options: &Options) -> Result<Scene> {
     let Contents { shapes, groups, emitters } = contents;
     let integrator = integrator.unwrap_or_default();
     let groups = groups.into_values();
-    for attribute in loader.attributes {
-        let grouped = groups.iter().flat_map(|group| &group.shapes);
-        attribute.bind(shapes.iter().chain(grouped).map(|shape| &shape.geometry))?;
-    }
+    let grouped = groups.iter().flat_map(|group| &group.shapes);
+    texture::bind(loader.attributes, shapes.iter().chain(grouped).map(|shape| &shape.geometry))?;
     let parts = Parts { shapes, groups, emitters, sensor, integrator, fingerprint };
     Scene::build(parts, options.threads).map_err(|error| match error {
         Error::Usage(what) => place.invalid(what),
@@ -181,15 +185,29 @@ impl Loader {
         made
     }
 
+    /// Builds something with the number of objects that looking it up goes through: references can double it at every
+    /// level of nesting.
+    fn counted<T>(&mut self, object: &Object, make: impl FnOnce(&mut Self) -> Result<T>) -> Result<(T, usize)> {
+        let outer = std::mem::take(&mut self.cost);
+        let made = self.guarded(object, make)?;
+        let cost = self.cost + 1;
+        if cost > MAX_COST {
+            return Err(object.place.invalid(format!("built from more than {MAX_COST} other objects")));
+        }
+        self.cost = outer + cost;
+        Ok((made, cost))
+    }
+
     /// Builds a BSDF, or gives the one already built from this object.
     pub fn bsdf(&mut self, object: &Rc<Object>) -> Result<Arc<dyn Bsdf>> {
-        if let Some(bsdf) = self.bsdfs.get(&Rc::as_ptr(object)) {
+        if let Some((bsdf, cost)) = self.bsdfs.get(&Rc::as_ptr(object)) {
+            self.cost += cost;
             return Ok(Arc::clone(bsdf));
         }
         let plugin = find(bsdf::PLUGINS, object)?;
-        let made = self.guarded(object, |loader| (plugin.make)(object, loader))?;
+        let (made, cost) = self.counted(object, |loader| (plugin.make)(object, loader))?;
         object.all_used(plugin.parameters)?;
-        self.bsdfs.insert(Rc::as_ptr(object), Arc::clone(&made));
+        self.bsdfs.insert(Rc::as_ptr(object), (Arc::clone(&made), cost));
         Ok(made)
     }
 
@@ -258,16 +276,17 @@ impl Loader {
 
     /// Builds a texture, or gives the one already built from this object.
     pub fn texture_object(&mut self, object: &Rc<Object>) -> Result<Arc<dyn Texture>> {
-        if let Some(texture) = self.textures.get(&Rc::as_ptr(object)) {
+        if let Some((texture, cost)) = self.textures.get(&Rc::as_ptr(object)) {
+            self.cost += cost;
             return Ok(Arc::clone(texture));
         }
         if object.class != "texture" {
             return Err(object.place.invalid(format!("a texture is needed here, not <{}>", object.class)));
         }
         let plugin = find(texture::PLUGINS, object)?;
-        let made = self.guarded(object, |loader| (plugin.make)(object, loader))?;
+        let (made, cost) = self.counted(object, |loader| (plugin.make)(object, loader))?;
         object.all_used(plugin.parameters)?;
-        self.textures.insert(Rc::as_ptr(object), Arc::clone(&made));
+        self.textures.insert(Rc::as_ptr(object), (Arc::clone(&made), cost));
         Ok(made)
     }
 

@@ -142,6 +142,14 @@ impl Object {
         }
     }
 
+    /// A complex index of refraction's part for red, green and blue.
+    pub fn index(&self, name: &str, default: Rgb) -> Result<Rgb> {
+        match self.get(name) {
+            Some(Property { value: Value::Spectrum(spectrum), .. }) => Ok(spectrum.in_daylight()),
+            _ => self.color(name, default),
+        }
+    }
+
     /// A linear colour of light.
     pub fn emission(&self, name: &str, default: Rgb) -> Result<Rgb> {
         match self.get(name) {

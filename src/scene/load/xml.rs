@@ -45,7 +45,9 @@ pub fn parse(path: &Path, parameters: &[(String, String)]) -> Result<Tree> {
     for (id, alias, place) in std::mem::take(&mut parser.aliases) {
         let object = parser.tree.ids.get(&id).cloned();
         let object = object.ok_or_else(|| place.invalid(format!("alias of the unknown id `{id}`")))?;
-        parser.tree.ids.insert(alias, object);
+        if parser.tree.ids.insert(alias.clone(), object).is_some() {
+            return Err(place.invalid(format!("the id `{alias}` is given twice")));
+        }
     }
     Ok(parser.tree)
 }
@@ -193,6 +195,9 @@ impl Parser {
             })?;
             result.push_str(value);
             rest = &after[end..];
+            if result.len() > MAX_PARAMETER {
+                break;
+            }
         }
         result.push_str(rest);
         if result.len() > MAX_PARAMETER {

@@ -26,10 +26,11 @@ fn make(object: &Object, loader: &mut Loader) -> Result<Geometry> {
     let Frame { s, t, .. } = Frame::around(axis.normalize());
     let placed = Mat4::from_cols((s * radius).extend(0.0), (t * radius).extend(0.0), axis.extend(0.0), p0.extend(1.0));
     let to_world = object.transform("to_world")? * placed;
-    let axes = [Vec3::X, Vec3::Y].map(|axis| to_world.transform_vector3(axis));
-    let radius = axes[0].length();
-    if (axes[1].length() - radius).abs() > 1e-3 * radius || axes[0].dot(axes[1]).abs() > 1e-3 * radius * radius {
-        return Err(object.place_of("to_world").unsupported("a cylinder scaled unevenly across its axis"));
+    let [x, y, z] = [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| to_world.transform_vector3(axis));
+    let skewed = |a: Vec3, b: Vec3| a.dot(b).abs() > 1e-3 * a.length() * b.length();
+    if (x.length() - y.length()).abs() > 1e-3 * x.length() || skewed(x, y) || skewed(x, z) || skewed(y, z) {
+        let what = "a cylinder that is sheared or scaled unevenly across its axis";
+        return Err(object.place_of("to_world").unsupported(what));
     }
     loader.finite(object, Geometry::Cylinder(Cylinder { to_world, to_object: to_world.inverse(), side }))
 }

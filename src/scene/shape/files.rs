@@ -29,7 +29,7 @@ fn make(object: &Object, loader: &mut Loader) -> Result<Geometry> {
     let to_world = object.transform("to_world")?;
     let face_normals = object.boolean("face_normals", false)?;
     let flip_normals = object.boolean("flip_normals", false)?;
-    let flip_tex_coords = object.boolean("flip_tex_coords = false", object.plugin == "obj")?;
+    let flip_tex_coords = object.boolean("flip_tex_coords", object.plugin == "obj")?;
     let mut data = loader.mesh(object)?;
     if flip_tex_coords {
         data.uvs.iter_mut().for_each(|uv| uv.y = 1.0 - uv.y);

@@ -81,7 +81,8 @@ impl Bitmap {
         let at = self.to_uv.apply(point.uv) * self.resolution() - 0.5;
         let corner = at.floor();
         let (x, y) = (corner.x as i64, corner.y as i64);
-        let texels = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(dx, dy)| self.fetch(x + dx, y + dy));
+        let texels =
+            [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(dx, dy)| self.fetch(x.saturating_add(dx), y.saturating_add(dy)));
         Footprint { texels, fraction: at - corner }
     }
 

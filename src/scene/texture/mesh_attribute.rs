@@ -1,5 +1,6 @@
 //! Colours and numbers that a mesh has at its vertices or faces.
 
+use std::collections::HashMap;
 use std::sync::{Arc, OnceLock};
 
 use super::{Point, Texture};
@@ -30,27 +31,28 @@ type Shapes = Vec<Option<(Arc<Geometry>, usize)>>;
 pub struct Unbound {
     name: String,
     place: Place,
-    shapes: Arc<OnceLock<Shapes>>,
+    shapes: Arc<OnceLock<Arc<Shapes>>>,
 }
 
-impl Unbound {
-    /// Looks the attribute up in every shape; one at least must have it.
-    pub fn bind<'a>(self, shapes: impl Iterator<Item = &'a Arc<Geometry>>) -> Result<()> {
+/// Looks the attributes up in every shape; one at least must have each.
+pub fn bind<'a>(attributes: Vec<Unbound>, geometries: impl Iterator<Item = &'a Arc<Geometry>> + Clone) -> Result<()> {
+    let mut tables: HashMap<String, Arc<Shapes>> = HashMap::new();
+    for Unbound { name, place, shapes } in attributes {
         let find = |geometry: &'a Arc<Geometry>| match &**geometry {
-            Geometry::Mesh(mesh) => Some((Arc::clone(geometry), mesh.attribute(&self.name)?)),
+            Geometry::Mesh(mesh) => Some((Arc::clone(geometry), mesh.attribute(&name)?)),
             _ => None,
         };
-        let found: Shapes = shapes.map(find).collect();
-        if found.iter().all(Option::is_none) {
-            return Err(self.place.invalid(format!("no mesh has the attribute `{}`", self.name)));
+        let table = tables.entry(name.clone()).or_insert_with(|| Arc::new(geometries.clone().map(find).collect()));
+        if table.iter().all(Option::is_none) {
+            return Err(place.invalid(format!("no mesh has the attribute `{name}`")));
         }
-        self.shapes.get_or_init(|| found);
-        Ok(())
+        shapes.get_or_init(|| Arc::clone(table));
     }
+    Ok(())
 }
 
 struct MeshAttribute {
-    shapes: Arc<OnceLock<Shapes>>,
+    shapes: Arc<OnceLock<Arc<Shapes>>>,
     scale: f32,
 }
 

@@ -6,7 +6,7 @@ mod mesh_attribute;
 mod texels;
 mod uniform;
 
-pub use self::mesh_attribute::Unbound;
+pub use self::mesh_attribute::{Unbound, bind};
 pub use self::texels::{Memory, Texels};
 use super::load::Plugin;
 use super::load::props::Object;

@@ -22,6 +22,7 @@ enum Samples {
     /// Beyond the memory bound.
     Cached {
         texture: CachedTexture,
+        origin: (i32, i32),
         order: [usize; 3],
         eight_bit: bool,
     },
@@ -62,7 +63,8 @@ impl Texels {
         if size > memory.left && order.iter().all(|&channel| channel < MAX_CHANNELS) {
             if let Some(system) = memory.system() {
                 let texture = CachedTexture::open(&system, path)?;
-                return Ok(Self { width, height, samples: Samples::Cached { texture, order, eight_bit } });
+                let samples = Samples::Cached { texture, origin: file.origin, order, eight_bit };
+                return Ok(Self { width, height, samples });
             }
         }
         memory.left = memory.left.saturating_sub(size);
@@ -90,10 +92,10 @@ impl Texels {
         match &self.samples {
             Samples::Float(texels) => texels[y * self.width + x],
             Samples::Byte(texels) => decode(texels[y * self.width + x], raw),
-            Samples::Cached { texture, order, eight_bit } => {
+            Samples::Cached { texture, origin, order, eight_bit } => {
                 let mut samples = [0.0; MAX_CHANNELS];
                 let count = order.iter().max().map_or(1, |&last| last + 1);
-                texture.texel(x, y, &mut samples[..count]);
+                texture.texel(origin.0 + x as i32, origin.1 + y as i32, &mut samples[..count]);
                 let color = order.map(|channel| samples[channel]);
                 if *eight_bit {
                     decode(color.map(|value| (value * 255.0).round() as u8), raw)

@@ -37,6 +37,8 @@ fn copy(scene: &Scene, base: &Surface, (wo, lobe): (Vec3, Lobe), offset: &Surfac
     let bsdf = scene.bsdf(offset);
     if lobe.is_delta() {
         let delta = bsdf.delta(offset, offset.wi, lobe)?;
+        // Where the base's material cannot tell its lobes apart, the way back fails, and so this one has to.
+        scene.bsdf(base).delta(base, base.wi, lobe)?;
         return Some(Copied { wo: delta.wo, value: delta.value, pdf: delta.probability, jacobian: 1.0 });
     }
     let (wo, jacobian) = if base.wi.z * wo.z > 0.0 {

@@ -7,14 +7,16 @@ use ply_rs_bw::ply::{ElementDef, Property, PropertyAccess, PropertyAccessResult,
 
 use super::MeshData;
 use crate::error::{Place, Result};
-use crate::math::{Rgb, Vec2, Vec3};
+use crate::math::{Rgb, Vec3, vec2};
+
+/// Columns with a place of their own.
+const POSITION: &[&str] = &["x", "y", "z", "nx", "ny", "nz"];
 
 /// A vertex as the file has it; what it does not have stays zero.
 #[derive(Default)]
 struct Vertex {
     position: Vec3,
     normal: Vec3,
-    uv: Vec2,
     /// Everything else, in the order of the header.
     others: Vec<f32>,
 }
@@ -46,8 +48,6 @@ impl PropertyAccess for Vertex {
             "nx" => &mut self.normal.x,
             "ny" => &mut self.normal.y,
             "nz" => &mut self.normal.z,
-            "u" | "s" | "texture_u" => &mut self.uv.x,
-            "v" | "t" | "texture_v" => &mut self.uv.y,
             _ => {
                 self.others.extend(number(property));
                 return PropertyAccessResult::Set;
@@ -89,35 +89,46 @@ impl PropertyAccess for Face {
     }
 }
 
-/// Properties that are not attributes.
-const GEOMETRY: &[&str] = &["x", "y", "z", "nx", "ny", "nz", "u", "v", "s", "t", "texture_u", "texture_v"];
+/// Names of texture coordinates; the first pair that a file has counts.
+const UVS: [[&str; 2]; 3] = [["u", "v"], ["texture_u", "texture_v"], ["s", "t"]];
+/// Endings that make columns of one name a colour; the first ending alone makes a number.
+const ENDINGS: [[&str; 3]; 4] = [["_0", "_1", "_2"], ["_1", "_2", "_3"], ["_x", "_y", "_z"], ["_r", "_g", "_b"]];
 
-/// The attributes among the other values of vertices or faces: `NAME_0`, `NAME_1`, `NAME_2` are a colour and `NAME_0`
-/// alone a number; red, green and blue are the colour `color`.
-fn attributes<'a>(
-    prefix: &str,
-    element: &ElementDef,
-    rows: impl Iterator<Item = &'a [f32]> + Clone,
-) -> Vec<(String, Vec<Rgb>)> {
+/// The columns that land in `others`: all single values that are no part of `known`.
+fn columns<'a>(element: &'a ElementDef, known: &[&str]) -> Vec<&'a str> {
     let scalar = |property: &PropertyType| matches!(property, PropertyType::Scalar(_));
     let scalars = element.properties.iter().filter(|(_, property)| scalar(&property.data_type));
-    let names: Vec<&str> = scalars.map(|(name, _)| name.as_str()).filter(|name| !GEOMETRY.contains(name)).collect();
-    let place = |name: &str| names.iter().position(|other| *other == name);
-    let mut stems: Vec<&str> = names.iter().filter_map(|name| name.strip_suffix("_0")).collect();
-    stems.dedup();
-    let numbered = stems.into_iter().map(|stem| {
-        let columns = [0, 1, 2].map(|i| place(&format!("{stem}_{i}")));
-        (stem, columns.map(|column| column.or(columns[0])))
-    });
-    let colors = [["r", "g", "b"], ["red", "green", "blue"]].map(|names| ("color", names.map(place)));
-    let columns = numbered.chain(colors).filter_map(|(stem, columns)| match columns {
-        [Some(r), Some(g), Some(b)] => Some((stem, [r, g, b])),
-        _ => None,
-    });
-    let value = |row: &[f32], columns: [usize; 3]| {
-        Rgb::from_array(columns.map(|column| row.get(column).copied().unwrap_or_default()))
-    };
-    columns.map(|(stem, at)| (format!("{prefix}{stem}"), rows.clone().map(|row| value(row, at)).collect())).collect()
+    scalars.map(|(name, _)| name.as_str()).filter(|name| !known.contains(name)).collect()
+}
+
+fn position(names: &[&str], name: &str) -> Option<usize> {
+    names.iter().position(|other| *other == name)
+}
+
+/// The attributes among columns of other values: names with numbered or lettered endings, and red, green and blue as
+/// the colour `color`.
+fn attributes<'a>(
+    prefix: &str,
+    names: &[&str],
+    rows: impl Iterator<Item = &'a [f32]> + Clone,
+) -> Vec<(String, Vec<Rgb>)> {
+    let mut found: Vec<(&str, [usize; 3])> = Vec::new();
+    for (endings, name) in ENDINGS.iter().flat_map(|endings| names.iter().map(move |name| (endings, *name))) {
+        let Some(stem) = name.strip_suffix(endings[0]) else { continue };
+        let [first, second, third] = endings.map(|ending| position(names, &format!("{stem}{ending}")));
+        // `tone_1` beside `tone_0` is the second column of that, not a name of its own.
+        if found.iter().all(|(other, _)| *other != stem) {
+            found.extend(first.map(|first| (stem, [first, second.unwrap_or(first), third.unwrap_or(first)])));
+        }
+    }
+    for colors in [["r", "g", "b"], ["red", "green", "blue"]] {
+        if let [Some(r), Some(g), Some(b)] = colors.map(|name| position(names, name)) {
+            found.push(("color", [r, g, b]));
+        }
+    }
+    let value = |row: &[f32], at: [usize; 3]| Rgb::from_array(at.map(|at| row.get(at).copied().unwrap_or_default()));
+    let values = |at: [usize; 3]| rows.clone().map(|row| value(row, at)).collect();
+    found.into_iter().map(|(stem, at)| (format!("{prefix}{stem}"), values(at))).collect()
 }
 
 /// Reads a mesh; faces with more than three corners become fans.
@@ -140,10 +151,13 @@ pub fn read(bytes: &[u8], path: &Path) -> Result<MeshData> {
                 if has("nx") && has("ny") && has("nz") {
                     mesh.normals = vertices.iter().map(|vertex| vertex.normal).collect();
                 }
-                if (has("u") && has("v")) || (has("s") && has("t")) || (has("texture_u") && has("texture_v")) {
-                    mesh.uvs = vertices.iter().map(|vertex| vertex.uv).collect();
+                let names = columns(element, POSITION);
+                let pairs = UVS.map(|pair| pair.map(|name| position(&names, name)));
+                if let Some([Some(u), Some(v)]) = pairs.into_iter().find(|pair| pair.iter().all(Option::is_some)) {
+                    let value = |row: &Vertex, at: usize| row.others.get(at).copied().unwrap_or_default();
+                    mesh.uvs = vertices.iter().map(|row| vec2(value(row, u), value(row, v))).collect();
                 }
-                mesh.attributes.extend(attributes("vertex_", element, vertices.iter().map(|vertex| &*vertex.others)));
+                mesh.attributes.extend(attributes("vertex_", &names, vertices.iter().map(|vertex| &*vertex.others)));
                 mesh.positions = vertices.into_iter().map(|vertex| vertex.position).collect();
             }
             "face" => {
@@ -161,7 +175,7 @@ pub fn read(bytes: &[u8], path: &Path) -> Result<MeshData> {
                     mesh.triangles.extend(corners.windows(2).skip(1).map(|pair| [corners[0], pair[0], pair[1]]));
                     others.resize(mesh.triangles.len(), &*face.others);
                 }
-                mesh.attributes.extend(attributes("face_", element, others.into_iter()));
+                mesh.attributes.extend(attributes("face_", &columns(element, &[]), others.into_iter()));
             }
             _ => {
                 Parser::<Face>::new().read_payload_for_element(&mut reader, element, &header).map_err(damaged)?;
@@ -169,4 +183,26 @@ pub fn read(bytes: &[u8], path: &Path) -> Result<MeshData> {
         }
     }
     Ok(mesh)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::vec3;
+
+    #[test]
+    fn attributes_keep_their_columns_and_faces_of_many_corners_their_values() {
+        let text = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
+            property float s\nproperty float t\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n\
+            property float heat_0\nelement face 2\nproperty list uchar int vertex_indices\nproperty float nx\n\
+            property float tone_r\nproperty float tone_g\nproperty float tone_b\nend_header\n\
+            0 0 0 0 1 10 20 30 0.5\n1 0 0 1 1 10 20 30 0.5\n1 1 0 1 0 10 20 30 0.5\n0 1 0 0 0.25 10 20 30 0.5\n\
+            4 0 1 2 3 9 0.1 0.2 0.3\n3 0 1 2 9 0.4 0.5 0.6\n";
+        let mesh = read(text.as_bytes(), Path::new("t.ply")).unwrap();
+        assert_eq!((mesh.triangles.len(), mesh.uvs[3]), (3, vec2(0.0, 0.25)));
+        let find = |name: &str| &mesh.attributes.iter().find(|(other, _)| other == name).unwrap().1;
+        assert_eq!(find("vertex_color")[1], vec3(10.0, 20.0, 30.0));
+        assert_eq!(find("vertex_heat")[2], Rgb::splat(0.5));
+        assert_eq!(*find("face_tone"), [vec3(0.1, 0.2, 0.3), vec3(0.1, 0.2, 0.3), vec3(0.4, 0.5, 0.6)]);
+    }
 }

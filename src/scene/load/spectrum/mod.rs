@@ -53,6 +53,9 @@ impl Spectrum {
     }
 
     fn curve(curve: Vec<[f64; 2]>, place: &Place) -> Result<Self> {
+        if curve.as_flattened().iter().any(|value| !value.is_finite()) {
+            return Err(place.invalid("a spectrum holds a number that is not finite"));
+        }
         if curve.is_empty() || curve.windows(2).any(|pair| pair[0][0] >= pair[1][0]) {
             return Err(place.invalid("the wavelengths of a spectrum must rise"));
         }
@@ -90,11 +93,19 @@ impl Spectrum {
         rgb.max(Rgb::ZERO)
     }
 
-    /// As a reflectance, or any quantity that is seen in daylight.
-    pub fn reflectance(&self) -> Rgb {
+    /// As a quantity that is seen in daylight, without bounds.
+    pub fn in_daylight(&self) -> Rgb {
         match self {
             Self::Uniform(value) => Rgb::splat(*value),
             Self::Curve(curve) => Self::integrate(curve, true),
+        }
+    }
+
+    /// As a reflectance; saturated curves would leave [0, 1].
+    pub fn reflectance(&self) -> Rgb {
+        match self {
+            Self::Uniform(_) => self.in_daylight(),
+            Self::Curve(_) => self.in_daylight().min(Rgb::ONE),
         }
     }
 
@@ -125,7 +136,7 @@ mod tests {
         assert!(reflectance.distance(vec3(0.596_924, 0.769_078, 0.536_862)) < 2e-5, "{reflectance}");
         let emission = parse("400:0, 500:8, 600:15.6, 700:18.4").unwrap().emission();
         assert!(emission.distance(vec3(20.7108, 10.8546, 2.77115)) < 2e-4, "{emission}");
-        let index = parse("400:2, 500:1.8, 600:1.6, 700:1").unwrap().reflectance();
+        let index = parse("400:2, 500:1.8, 600:1.6, 700:1").unwrap().in_daylight();
         assert!(index.distance(vec3(1.42431, 1.71997, 1.9091)) < 5e-5, "{index}");
         let flat = parse("300:1 900:1").unwrap().emission();
         assert!(flat.distance(parse("1").unwrap().emission()) < 5e-4, "{flat}");
