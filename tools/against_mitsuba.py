@@ -1,14 +1,15 @@
 """Fluxion beside Mitsuba 3: radiance, gradients, correlation and speed, as the tables of docs/results.md.
 
-    python tools/against_mitsuba.py radiance SCENES REFERENCES [SPP=512] [NAME]
+    python tools/against_mitsuba.py radiance SCENES REFERENCES [SPP=512] [NAME] [mitsuba]
     python tools/against_mitsuba.py gradients [SPP=128]
     python tools/against_mitsuba.py correlation SCENES REFERENCES [SPP=64]
     python tools/against_mitsuba.py speed SCENES [SPP=8]
     python tools/against_mitsuba.py bundled [SPP=1024]
+    python tools/against_mitsuba.py loading SCENES [NAME ...]
 
 SCENES is a folder with NAME/scene.xml; REFERENCES one with NAME.exr (mean) and NAME_var.exr (variance of the mean),
 box filtered. Run from the repository's top folder after `cargo build --release`. Needs PyPI openimageio and numpy, and
-mitsuba for `speed` and `bundled` (with DRJIT_LIBLLVM_PATH naming libLLVM for the LLVM variant).
+mitsuba for `speed`, `bundled` and `loading` (with DRJIT_LIBLLVM_PATH naming libLLVM for the LLVM variant).
 """
 import json
 import os
@@ -26,7 +27,7 @@ FLUXION = "target/release/fluxion"
 SIZES = {"cornell-box": (256, 256), "veach-mis": (320, 180), "veach-ajar": (320, 180), "kitchen": (320, 180),
          "living-room": (320, 180)}
 UNIT = ["diffuse", "rough-conductor", "dielectric", "environment", "occluder", "plastic", "rough-plastic", "mask", "bump",
-        "thin-pane", "sphere-light", "mirror-rooms"]
+        "thin-pane", "sphere-light", "mirror-rooms", "lens", "rough-glass", "instances", "principled", "normal-map"]
 
 
 def read(path):
@@ -86,8 +87,8 @@ def fresh(path, size, spp=512, runs=8):
     return np.mean(images, 0), np.var(images, 0, ddof=1) / runs
 
 
-def radiance(scenes, references, spp="512", only=""):
-    """Every scene against its reference. Variances of a single sample are divided by our samples; those of test
+def radiance(scenes, references, spp="512", only="", program="fluxion"):
+    """Every scene against its reference, by Fluxion or, to tell what is the reference's own, by `mitsuba`. Variances of a single sample are divided by our samples; those of test
     references were taken with many more samples than we have, so that they count as exact."""
     print("| scene | mean ratio R G B | standard error | z rms | beyond 4 | load s | render s | MB |")
     print("|---|---|---|---|---|---|---|---|")
@@ -100,18 +101,19 @@ def radiance(scenes, references, spp="512", only=""):
             # Its reference was filtered with a Gaussian: a new one is rendered.
             expected, theirs = fresh(scene, expected.shape[1::-1])
             of_sample = False
-        try:
+        rest = ""
+        if program == "mitsuba":
+            mean, ours = fresh(scene, expected.shape[1::-1], samples // 8)
+        else:
             _, layers, stats = fluxion(scene, expected.shape[1::-1], samples, "primal")
-        except subprocess.CalledProcessError:
-            print("| %s | failed |" % name, flush=True)
-            continue
-        mean = rgb(layers) + rgb(layers, "direct.")
-        ours = rgb(layers, "variance.") + rgb(layers, "direct_variance.")
+            mean = rgb(layers) + rgb(layers, "direct.")
+            ours = rgb(layers, "variance.") + rgb(layers, "direct_variance.")
+            rest = " %.2f | %.1f | %.0f |" % (
+                stats["seconds"]["load"], stats["seconds"]["render"], stats["peak_bytes"] / 1e6)
         if of_sample:
             # Pixels that all of one program's samples missed have no variance there; the floor is for rounding.
             ours, theirs = np.maximum(np.maximum(ours, theirs / samples), 1e-4 / samples), 0
-        z_row(name, mean, ours, expected, theirs, " %.2f | %.1f | %.0f |" % (
-            stats["seconds"]["load"], stats["seconds"]["render"], stats["peak_bytes"] / 1e6))
+        z_row(name, mean, ours, expected, theirs, rest)
 
 
 def gradients(spp="128", runs=16):
@@ -222,7 +224,36 @@ def bundled(spp="1024"):
         z_row(name, mean, variance, expected, theirs)
 
 
+LOAD = """
+import sys, time, resource
+import mitsuba as mi
+mi.set_variant(sys.argv[1])
+start = time.time()
+mi.load_file(sys.argv[2])
+print(time.time() - start, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3)
+"""
+
+
+def loading(scenes, *names):
+    """Seconds to a scene that is ready to be rendered, and peak memory; the programs take turns, medians of five."""
+    print("| scene | Fluxion s | MB | scalar_rgb s | MB | llvm_ad_rgb s | MB | Fluxion / scalar | Fluxion / llvm |")
+    print("|---|---|---|---|---|---|---|---|---|")
+    for name in names or ("kitchen", "staircase"):
+        path = os.path.join(scenes, name, "scene.xml")
+        figures = {"fluxion": [], "scalar_rgb": [], "llvm_ad_rgb": []}
+        for _ in range(5):
+            _, _, stats = fluxion(path, (8, 8), 1, "primal")
+            figures["fluxion"].append((stats["seconds"]["load"], stats["peak_bytes"] / 1e6))
+            for variant in ("scalar_rgb", "llvm_ad_rgb"):
+                run = subprocess.run([sys.executable, "-c", LOAD, variant, path], capture_output=True, text=True, check=True)
+                figures[variant].append(tuple(float(word) for word in run.stdout.split()[-2:]))
+        middle = {key: [statistics.median(column) for column in zip(*rows)] for key, rows in figures.items()}
+        ours, scalar, llvm = (middle[key] for key in figures)
+        print("| %s | %.2f | %.0f | %.2f | %.0f | %.2f | %.0f | %.2f | %.2f |" % (
+            name, *ours, *scalar, *llvm, ours[0] / scalar[0], ours[0] / llvm[0]), flush=True)
+
+
 if __name__ == "__main__":
-    if len(sys.argv) < 2 or sys.argv[1] not in ("radiance", "gradients", "correlation", "speed", "bundled"):
+    if len(sys.argv) < 2 or sys.argv[1] not in ("radiance", "gradients", "correlation", "speed", "bundled", "loading"):
         sys.exit(__doc__)
     globals()[sys.argv[1]](*sys.argv[2:])

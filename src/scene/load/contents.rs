@@ -1,5 +1,6 @@
 //! The shapes and emitters of a scene, as they are gathered.
 
+use std::collections::HashMap;
 use std::rc::Rc;
 use std::sync::Arc;
 
@@ -24,14 +25,17 @@ pub struct Contents {
     pub emitters: Vec<Box<dyn Emitter>>,
 }
 
-/// Shapes that are placed together, by the object that describes them.
+/// Shapes that are placed together, with the box around them.
 #[derive(Default)]
-pub struct Groups(Vec<(*const Object, Group)>);
+pub struct Groups {
+    list: Vec<(Bounds, Group)>,
+    by_origin: HashMap<*const Object, usize>,
+}
 
 impl Groups {
-    /// The groups without their origin.
+    /// The groups alone.
     pub fn into_values(self) -> Vec<Group> {
-        self.0.into_iter().map(|(_, group)| group).collect()
+        self.list.into_iter().map(|(_, group)| group).collect()
     }
 }
 
@@ -89,8 +93,7 @@ impl Contents {
             return Err(group.place.invalid(format!("an instance of `{}`; it takes a shapegroup", group.plugin)));
         }
         object.all_used("to_world, one shapegroup")?;
-        let group = self.group(group, loader)?;
-        let bounds = group.shapes.iter().fold(Bounds::EMPTY, |all, shape| all.union(shape.geometry.bounds()));
+        let (bounds, group) = self.group(group, loader)?;
         if !bounds.transformed(to_world).is_finite() {
             return Err(object.place.invalid("coordinates are not finite"));
         }
@@ -99,30 +102,29 @@ impl Contents {
     }
 
     /// A group, whose shapes are made when it is first asked for.
-    fn group(&mut self, object: &Rc<Object>, loader: &mut Loader) -> Result<&mut Group> {
-        let groups = &mut self.groups.0;
-        let found = groups.iter().position(|(origin, _)| *origin == Rc::as_ptr(object));
-        let index = match found {
-            Some(index) => index,
-            None => {
-                let mut shapes = Vec::new();
-                for child in children(object, loader)? {
-                    if ["instance", "shapegroup", "merge"].contains(&child.plugin.as_str()) {
-                        return Err(child.place.unsupported(format!("`{}` in a shapegroup", child.plugin)));
-                    }
-                    if let Some((shape, emitter)) = single(&child, loader, (0, 0))? {
-                        if emitter.is_some() {
-                            return Err(child.place.unsupported("an emitter in a shapegroup"));
-                        }
-                        shapes.push(shape);
-                    }
-                }
-                object.all_used("nested shapes")?;
-                groups.push((Rc::as_ptr(object), Group { shapes, placements: Vec::new() }));
-                groups.len() - 1
+    fn group(&mut self, object: &Rc<Object>, loader: &mut Loader) -> Result<&mut (Bounds, Group)> {
+        let Groups { list, by_origin } = &mut self.groups;
+        if let Some(&index) = by_origin.get(&Rc::as_ptr(object)) {
+            return Ok(&mut list[index]);
+        }
+        let mut shapes = Vec::new();
+        for child in children(object, loader)? {
+            if CONTAINERS.iter().any(|(name, _)| *name == child.plugin) {
+                return Err(child.place.unsupported(format!("`{}` in a shapegroup", child.plugin)));
             }
-        };
-        Ok(&mut groups[index].1)
+            if let Some((shape, emitter)) = single(&child, loader, (0, 0))? {
+                if emitter.is_some() {
+                    return Err(child.place.unsupported("an emitter in a shapegroup"));
+                }
+                shapes.push(shape);
+            }
+        }
+        object.all_used("nested shapes")?;
+        let bounds = shapes.iter().fold(Bounds::EMPTY, |all, shape| all.union(shape.geometry.bounds()));
+        let index = list.len();
+        by_origin.insert(Rc::as_ptr(object), index);
+        list.push((bounds, Group { shapes, placements: Vec::new() }));
+        Ok(&mut list[index])
     }
 }
 
