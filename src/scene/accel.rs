@@ -120,6 +120,7 @@ fn attach(builder: &mut SceneBuilder, shapes: &[Shape]) -> Result<Bounds> {
     Ok(bounds)
 }
 
+#[inline]
 fn shape_surface(shapes: &[Shape], number: u32, hit: &Hit, ray: Ray) -> Surface {
     let shape = &shapes[number as usize];
     let mut surface = shape.geometry.surface(hit, ray, shape.bsdf.needs_derivatives());
@@ -128,7 +129,9 @@ fn shape_surface(shapes: &[Shape], number: u32, hit: &Hit, ray: Ray) -> Surface 
 }
 
 impl Placement {
-    /// The hit is found in the group's own coordinates, along an unnormalised ray so that distances stay the same.
+    /// The hit is found in the group's own coordinates, along an unnormalised ray so that distances stay the same. Kept
+    /// apart from the common case, which is inlined.
+    #[inline(never)]
     fn surface(&self, shapes: &[Shape], hit: &Hit, ray: Ray) -> Surface {
         let inside = Ray {
             origin: self.to_group.transform_point3(ray.origin),
