@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use anyhow::{Result, bail};
+use clap::builder::{PossibleValue, PossibleValuesParser};
 use fluxion::error::Error;
 use fluxion::film::{Frame, Layer, Needs, exr};
 use fluxion::image::io;
@@ -62,8 +63,8 @@ pub struct Args {
     /// Value of a scene parameter, over its <default>
     #[arg(short = 'D', value_parser = super::parse_definition, value_name = "NAME=VALUE")]
     define: Vec<(String, String)>,
-    /// How paths are moved to neighbouring pixels: reconnect or replay
-    #[arg(long, default_value = SHIFTS[0].0, value_parser = SHIFTS.iter().map(|row| row.0).collect::<Vec<_>>(), hide_short_help = true)]
+    /// How paths are moved to neighbouring pixels
+    #[arg(long, default_value = SHIFTS[0].0, value_parser = shift_names(), hide_short_help = true)]
     shift: String,
     /// Roughness above which `reconnect` goes through a material instead of copying half vectors
     #[arg(long, value_name = "ALPHA", hide_short_help = true)]
@@ -141,6 +142,10 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     }
     report(args, &stats);
     Ok(ExitCode::SUCCESS)
+}
+
+fn shift_names() -> PossibleValuesParser {
+    SHIFTS.iter().map(|(name, _, summary)| PossibleValue::new(*name).help(*summary)).collect::<Vec<_>>().into()
 }
 
 fn shift(args: &Args) -> Shift {

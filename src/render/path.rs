@@ -134,10 +134,7 @@ fn light(scene: &Scene, surface: &Surface, choice: f32, u: Vec2) -> Option<Light
     let direction = point.direction(surface.p);
     let wo = surface.to_local(direction);
     let mut eval = scene.bsdf(surface).eval(surface, surface.wi, wo);
-    if point.delta {
-        // Scattering never finds it.
-        eval.pdf = 0.0;
-    }
+    eval.pdf = point.scatter_pdf(eval.pdf);
     let radiance = scene.radiance(&point, -direction);
     let lit = eval.value * radiance != Rgb::ZERO && scene.visible(surface, &point);
     lit.then_some(Light { point, radiance, wo, eval, pdf })

@@ -26,7 +26,7 @@ use super::Surface;
 use super::load::Plugin;
 use super::load::props::{Object, Property, Value};
 use crate::error::Result;
-use crate::math::{Rgb, Vec2, Vec3};
+use crate::math::{Rgb, Vec2, Vec3, vec3};
 
 /// The BSDFs of scene files.
 pub const PLUGINS: &[Plugin<Arc<dyn Bsdf>>] = &[
@@ -142,6 +142,11 @@ pub trait Bsdf: Send + Sync {
     fn needs_derivatives(&self) -> bool {
         false
     }
+}
+
+/// A local direction seen from the other side of the surface.
+fn mirror(w: Vec3) -> Vec3 {
+    vec3(w.x, w.y, -w.z)
 }
 
 /// The default interior of plastics.

@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use super::{Bsdf, BsdfSample, Delta, Eval, Lobe};
+use super::{Bsdf, BsdfSample, Delta, Eval, Lobe, mirror};
 use crate::error::Result;
-use crate::math::{Rgb, Vec2, Vec3, vec3};
+use crate::math::{Rgb, Vec2, Vec3};
 use crate::scene::Surface;
 use crate::scene::load::props::Object;
 use crate::scene::load::{Loader, Plugin};
@@ -28,10 +28,6 @@ fn make(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Bsdf>> {
 struct TwoSided {
     front: Arc<dyn Bsdf>,
     back: Arc<dyn Bsdf>,
-}
-
-fn mirror(w: Vec3) -> Vec3 {
-    vec3(w.x, w.y, -w.z)
 }
 
 impl TwoSided {

@@ -40,8 +40,7 @@ impl Emitter for Constant {
     }
 
     fn enclose(&mut self, scene: Bounds) {
-        let (_, radius) = scene.sphere();
-        self.area = PI * radius * radius;
+        self.area = scene.cross_section();
     }
 
     fn is_environment(&self) -> bool {

@@ -1,7 +1,5 @@
 //! Parallel light from infinitely far away, like the sun without its disk.
 
-use std::f32::consts::PI;
-
 use super::{Emitter, LightPoint, Position};
 use crate::error::Result;
 use crate::math::{Rgb, Vec2, Vec3};
@@ -50,8 +48,7 @@ impl Emitter for Directional {
     }
 
     fn enclose(&mut self, scene: Bounds) {
-        let (_, radius) = scene.sphere();
-        self.area = PI * radius * radius;
+        self.area = scene.cross_section();
     }
 
     fn name(&self) -> &'static str {

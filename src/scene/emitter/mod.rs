@@ -84,6 +84,11 @@ impl LightPoint {
         }
     }
 
+    /// Density with which scattering of density `pdf` runs into the point: never, when it is the only one.
+    pub fn scatter_pdf(&self, pdf: f32) -> f32 {
+        if self.delta { 0.0 } else { pdf }
+    }
+
     /// A density per area as one per solid angle at `from`; 0 from behind.
     pub fn area_to_solid_angle(&self, from: Vec3, density: f32) -> f32 {
         let factor = self.solid_angle(from);

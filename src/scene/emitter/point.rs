@@ -33,7 +33,7 @@ impl Emitter for Point {
     }
 
     fn pdf(&self, from: Vec3, point: &LightPoint) -> f32 {
-        1.0 / point.solid_angle(from)
+        point.area_to_solid_angle(from, 1.0)
     }
 
     fn radiance(&self, _point: &LightPoint, _direction: Vec3) -> Rgb {

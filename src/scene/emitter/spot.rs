@@ -53,7 +53,7 @@ impl Emitter for Spot {
     }
 
     fn pdf(&self, from: Vec3, point: &LightPoint) -> f32 {
-        1.0 / point.solid_angle(from)
+        point.area_to_solid_angle(from, 1.0)
     }
 
     fn radiance(&self, _point: &LightPoint, direction: Vec3) -> Rgb {

@@ -8,6 +8,8 @@ pub mod mesh;
 mod rectangle;
 pub mod sphere;
 
+use std::f32::consts::PI;
+
 pub use self::cylinder::Cylinder;
 pub use self::disk::Disk;
 pub use self::mesh::Mesh;
@@ -51,6 +53,12 @@ impl Bounds {
     /// The box around two boxes.
     pub fn union(self, other: Self) -> Self {
         Self { lower: self.lower.min(other.lower), upper: self.upper.max(other.upper) }
+    }
+
+    /// Area that the sphere around the box shows to light from afar.
+    pub fn cross_section(self) -> f32 {
+        let (_, radius) = self.sphere();
+        PI * radius * radius
     }
 
     /// The box around this one after a transform.

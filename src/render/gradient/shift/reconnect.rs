@@ -60,6 +60,5 @@ pub fn to_light(scene: &Scene, base: &Surface, offset: &Surface, point: &LightPo
         return None;
     }
     let light_pdf = scene.emitter_pdf(offset.p, point);
-    let pdf = if point.delta { 0.0 } else { eval.pdf };
-    Some(End { value: eval.value, pdf, light_pdf, radiance, jacobian })
+    Some(End { value: eval.value, pdf: point.scatter_pdf(eval.pdf), light_pdf, radiance, jacobian })
 }

@@ -175,7 +175,7 @@ impl<'a> Walk<'a> {
             }
             State::Joining(prefix, wi) => {
                 let moved = self.scene.bsdf(&vertex.surface).eval(&vertex.surface, wi, *wo);
-                let moved_pdf = if point.delta { 0.0 } else { moved.pdf };
+                let moved_pdf = point.scatter_pdf(moved.pdf);
                 self.add_pair(of, prefix.throughput * moved.value * *radiance, prefix.ratio * (pdf + moved_pdf));
             }
             State::Apart(prefix, surface) => {

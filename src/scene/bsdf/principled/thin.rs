@@ -5,10 +5,10 @@ use std::sync::Arc;
 
 use super::terms;
 use crate::error::Result;
-use crate::math::{Rgb, Vec2, Vec3, fresnel, vec3, warp};
+use crate::math::{Rgb, Vec2, Vec3, fresnel, warp};
 use crate::scene::Surface;
 use crate::scene::bsdf::microfacet::Microfacet;
-use crate::scene::bsdf::{Bsdf, BsdfSample, Eval, Lobe};
+use crate::scene::bsdf::{Bsdf, BsdfSample, Eval, Lobe, mirror};
 use crate::scene::load::props::Object;
 use crate::scene::load::{Loader, Plugin};
 use crate::scene::texture::Texture;
@@ -70,10 +70,6 @@ struct Local {
     transmitting: Microfacet,
 }
 
-fn mirrored(w: Vec3) -> Vec3 {
-    vec3(w.x, w.y, -w.z)
-}
-
 impl PrincipledThin {
     fn local(&self, surface: &Surface) -> Local {
         let at = |texture: &Arc<dyn Texture>| texture.scalar(&surface.at);
@@ -105,7 +101,7 @@ impl Bsdf for PrincipledThin {
             let facets = if reflects { &local.reflecting } else { &local.transmitting };
             let m = facets.sample_visible(from, u);
             let above = fresnel::reflect_about(from, m);
-            let wo = if reflects { above } else { mirrored(above) };
+            let wo = if reflects { above } else { mirror(above) };
             if above.z <= 0.0 || !terms::same_side(m, from, wo, reflects) {
                 return None;
             }
@@ -128,7 +124,7 @@ impl Bsdf for PrincipledThin {
         let side = wi.z.signum();
         let (wi, wo) = (wi * side, wo * side);
         let reflects = wo.z > 0.0;
-        let above = if reflects { wo } else { mirrored(wo) };
+        let above = if reflects { wo } else { mirror(wo) };
         let m = (wi + above).normalize();
         let base = self.base_color.color(&surface.at);
         let at = |texture: &Arc<dyn Texture>| texture.scalar(&surface.at);

@@ -25,6 +25,11 @@ pub struct MeshData {
     pub attributes: Vec<(String, Vec<Rgb>)>,
 }
 
+/// A face as triangles around its first corner.
+fn fan(corners: &[u32]) -> impl Iterator<Item = [u32; 3]> {
+    corners.windows(2).skip(1).map(|pair| [corners[0], pair[0], pair[1]])
+}
+
 /// The mesh in the bytes of a file; `index` chooses among those of a serialized file. `path` is for messages.
 pub fn read(format: &str, bytes: &[u8], index: usize, path: &Path) -> Result<MeshData> {
     let mesh = match format {

@@ -43,7 +43,7 @@ impl File {
             }
             Some("f") => {
                 let corners = words.map(|word| self.vertex(word)).collect::<Result<Vec<_>, _>>()?;
-                self.mesh.triangles.extend(corners.windows(2).skip(1).map(|pair| [corners[0], pair[0], pair[1]]));
+                self.mesh.triangles.extend(super::fan(&corners));
             }
             _ => {}
         }

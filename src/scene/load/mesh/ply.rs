@@ -172,7 +172,7 @@ pub fn read(bytes: &[u8], path: &Path) -> Result<MeshData> {
                         if fits { Ok(index as u32) } else { Err(what()) }
                     };
                     let corners = face.corners.iter().copied().map(corner).collect::<Result<Vec<_>>>()?;
-                    mesh.triangles.extend(corners.windows(2).skip(1).map(|pair| [corners[0], pair[0], pair[1]]));
+                    mesh.triangles.extend(super::fan(&corners));
                     others.resize(mesh.triangles.len(), &*face.others);
                 }
                 mesh.attributes.extend(attributes("face_", &columns(element, &[]), others.into_iter()));
