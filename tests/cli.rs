@@ -77,7 +77,7 @@ fn figures_come_as_json_with_the_promised_keys() {
         (Some(2), Some(512), Some(0))
     );
     assert!(stats["peak_bytes"].as_u64().unwrap() > 1 << 20);
-    assert_eq!((stats["method"].as_str(), stats["plan"].as_str()), (Some("l2"), Some("+gradients -features -bins")));
+    assert_eq!((stats["method"].as_str(), stats["plan"].as_str()), (Some("frgr"), Some("+gradients +features -bins")));
     let output =
         fluxion(folder.path()).args(["compare", "a.exr", "a.exr", "--json", "--map", "map.png"]).output().unwrap();
     let figures: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();

@@ -64,9 +64,11 @@ fn noisy(width: usize, height: usize, scale: f32) -> Frame {
     frame
 }
 
+const QUIET: Context = Context { progress: &|_, _| {}, memory: None, notes: false };
+
 fn run(method: &Method, frame: &Frame) -> Result<Image, Error> {
     let method = parse(method.id)?;
-    solve(method.as_ref(), frame, &Context { progress: &|_, _| {} }).map(|solution| solution.image)
+    solve(method.as_ref(), frame, &QUIET).map(|solution| solution.image)
 }
 
 fn assert_close(method: &Method, a: &Image, b: &Image, tolerance: f32) {
@@ -125,12 +127,53 @@ fn threads_do_not_matter() {
 }
 
 #[test]
+fn the_bound_on_memory_changes_no_bit_or_is_refused() {
+    for method in METHODS {
+        let made = parse(method.id).unwrap();
+        let frame = noisy(70, 150, 1.0);
+        let free = run(method, &frame).unwrap();
+        let mut taken = 0;
+        for megabytes in (1..12).chain([1000]) {
+            let context = Context { memory: Some(megabytes << 20), ..QUIET };
+            match solve(made.as_ref(), &frame, &context) {
+                Ok(solution) => {
+                    taken += 1;
+                    assert!(solution.image == free, "{} within {megabytes} MB", method.id);
+                }
+                Err(error) => {
+                    assert!(error.to_string().contains("--max-memory"), "{error}");
+                    assert_eq!(taken, 0, "{}: {megabytes} MB are not enough, but less was", method.id);
+                }
+            }
+        }
+        assert!(taken > 0, "{}", method.id);
+    }
+}
+
+#[test]
+fn notes_are_made_on_request_only() {
+    for method in METHODS {
+        let made = parse(method.id).unwrap();
+        let frame = noisy(20, 30, 1.0);
+        assert!(solve(made.as_ref(), &frame, &QUIET).unwrap().notes.is_empty());
+        let solution = solve(made.as_ref(), &frame, &Context { notes: true, ..QUIET }).unwrap();
+        let plain = |c: char| c.is_ascii_alphanumeric() || c == '_';
+        for note in &solution.notes {
+            assert!(note.name.chars().all(plain) && note.image.data.iter().all(|value| value.is_finite()));
+        }
+        assert_eq!(solution.image, run(method, &frame).unwrap());
+    }
+}
+
+#[test]
 fn a_missing_layer_is_named_with_the_way_to_get_it() {
     for method in METHODS {
         let needs = parse(method.id).unwrap().needs();
         let mut frame = Frame::new(3, 3);
         assert!(run(method, &frame).unwrap_err().to_string().contains("`R, G, B`"));
         frame.set(Layer::Color, Image::new(3, 3, 3));
+        frame.set(Layer::ColorVariance, Image::new(3, 3, 3));
+        frame.set(Layer::Samples, Image { data: vec![1.0; 9], ..Image::new(3, 3, 1) });
         if needs.edges {
             let message = run(method, &frame).unwrap_err().to_string();
             assert!(message.contains("dx.R") && message.contains("--method"), "{message}");
@@ -155,7 +198,11 @@ fn values_that_are_not_finite_are_errors_that_name_the_pixel() {
 #[test]
 fn parameters_are_checked() {
     for (text, expected) in [
-        ("nosuch", "there are primal, l2"),
+        ("nosuch", "there are primal, l2, frgr"),
+        ("frgr:levels=0", "from 1 to 8"),
+        ("frgr:form=nosuch", "paper, code or best"),
+        ("frgr:albedo=maybe", "on or off"),
+        ("frgr:radius=11", "from 1 to 10"),
         ("l2:beta=1", "it has alpha"),
         ("l2:alpha", "not like name=value"),
         ("l2:alpha=0", "must be a number"),

@@ -48,7 +48,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     if let Some(path) = &args.map {
         let map = metric.measure(&image, &reference)?.map;
         let map = map.ok_or_else(|| Error::Usage(format!("metric `{}` has no map", args.metric)))?;
-        io::write_color(path, &heat(&map), &[])?;
+        io::write_color(path, &heat(&map), None, &[])?;
     }
     let text = serde_json::to_string_pretty(&object)? + "\n";
     match (&json_file, to_stdout) {

@@ -2,6 +2,7 @@
 
 mod compare;
 mod info;
+mod method;
 mod outputs;
 mod progress;
 mod reconstruct;

@@ -6,10 +6,9 @@ use std::time::Instant;
 
 use anyhow::Result;
 use fluxion::film::{Layer, exr};
-use fluxion::reconstruct;
 
+use super::method;
 use super::outputs::Claims;
-use super::render::{solve, write};
 use super::stats::Stats;
 
 /// Options of `reconstruct`.
@@ -20,9 +19,8 @@ pub struct Args {
     /// Image to write, by its extension: exr, hdr, png or jpg; may be given several times
     #[arg(short, long, required = true, value_name = "FILE")]
     output: Vec<PathBuf>,
-    /// Reconstruction with its parameters; `fluxion info --methods` lists them
-    #[arg(long, default_value = reconstruct::DEFAULT, value_name = "NAME[:KEY=VALUE,...]")]
-    method: String,
+    #[command(flatten)]
+    method: method::Args,
     /// Threads to work with (0: one per core)
     #[arg(long, default_value_t = 0)]
     threads: usize,
@@ -37,8 +35,8 @@ pub struct Args {
 /// Reads layers, reconstructs and writes.
 pub fn run(args: &Args) -> Result<ExitCode> {
     super::use_threads(args.threads)?;
-    let method = reconstruct::parse(&args.method)?;
-    let mut stats = Stats { method: args.method.clone(), ..Stats::default() };
+    let method = args.method.make()?;
+    let mut stats = Stats { method: args.method.method.clone(), ..Stats::default() };
     let start = Instant::now();
     let mut frame = exr::load(&args.layers)?;
     let _claims = Claims::new(&args.output, &[&args.json], Some(&args.layers))?;
@@ -47,13 +45,13 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     stats.plan = frame.attribute("fluxion:plan").unwrap_or_default().to_owned();
     let sum = |layer| frame.get(layer).map_or(0.0, |image| image.data.iter().map(|&n| f64::from(n)).sum());
     (stats.samples, stats.rejected) = (sum(Layer::Samples) as u64, sum(Layer::Rejected) as u64);
-    let solution = solve(method.as_ref(), &frame, args.quiet, &mut stats)?;
+    let solution = args.method.solve(method.as_ref(), &frame, args.quiet, &mut stats)?;
     for (name, value) in &mut frame.attributes {
         if name == "fluxion:method" {
-            value.clone_from(&args.method);
+            value.clone_from(&args.method.method);
         }
     }
-    write(&args.output, &solution, &frame, &mut stats)?;
+    method::write(&args.output, &solution, &frame, &mut stats)?;
     if let Some(path) = &args.json {
         stats.save(path)?;
     }

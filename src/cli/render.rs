@@ -10,9 +10,7 @@ use anyhow::{Result, bail};
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use fluxion::error::Error;
 use fluxion::film::{Frame, Layer, Needs, exr};
-use fluxion::image::io;
 use fluxion::plan::Plan;
-use fluxion::reconstruct::{self, Context, Solution};
 use fluxion::render::gradient::Tracer;
 use fluxion::render::gradient::shift::{SHIFTS, Shift};
 use fluxion::render::{self, Budget, Control, Outcome, SampleId, Settings};
@@ -20,7 +18,7 @@ use fluxion::scene::{Scene, load};
 
 use super::outputs::Claims;
 use super::stats::Stats;
-use super::{progress, stats};
+use super::{method, progress, stats};
 
 /// Options of `render`.
 #[derive(clap::Args)]
@@ -45,9 +43,8 @@ pub struct Args {
     /// Film size in place of the scene's, as in 640x360
     #[arg(long, value_parser = super::parse_size, value_name = "WxH")]
     size: Option<(usize, usize)>,
-    /// Reconstruction with its parameters; `fluxion info --methods` lists them
-    #[arg(long, default_value = reconstruct::DEFAULT, value_name = "NAME[:KEY=VALUE,...]")]
-    method: String,
+    #[command(flatten)]
+    method: method::Args,
     /// EXR file for everything that was recorded, for `fluxion reconstruct`
     #[arg(long, value_name = "FILE")]
     layers: Option<PathBuf>,
@@ -97,9 +94,9 @@ fn parse_sample(text: &str) -> Result<(usize, usize, u32), String> {
 /// Renders, reconstructs and writes.
 pub fn run(args: &Args) -> Result<ExitCode> {
     super::use_threads(args.threads)?;
-    let method = reconstruct::parse(&args.method)?;
+    let method = args.method.make()?;
     let _claims = Claims::new(&args.output, &[&args.layers, &args.json], None)?;
-    let mut stats = Stats { method: args.method.clone(), ..Stats::default() };
+    let mut stats = Stats { method: args.method.method.clone(), ..Stats::default() };
     let start = Instant::now();
     let texture_memory = args.texture_memory << 20;
     let options =
@@ -135,8 +132,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         exr::save(path, &frame)?;
         stats.seconds.write += start.elapsed().as_secs_f64();
     }
-    let solution = solve(method.as_ref(), &frame, args.quiet, &mut stats)?;
-    write(&args.output, &solution, &frame, &mut stats)?;
+    let solution = args.method.solve(method.as_ref(), &frame, args.quiet, &mut stats)?;
+    method::write(&args.output, &solution, &frame, &mut stats)?;
     if let Some(path) = &args.json {
         stats.save(path)?;
     }
@@ -214,39 +211,10 @@ fn attributes(args: &Args, scene: &Scene, stats: &Stats) -> Vec<(String, String)
         ("fluxion:seed", args.seed.to_string()),
         ("fluxion:spp", stats.spp.to_string()),
         ("fluxion:seconds", format!("{:.3}", stats.seconds.render)),
-        ("fluxion:method", args.method.clone()),
+        ("fluxion:method", args.method.method.clone()),
         ("fluxion:plan", stats.plan.clone()),
     ];
     pairs.map(|(name, value)| (name.to_owned(), value)).to_vec()
-}
-
-/// Reconstructs with progress and takes the time.
-pub fn solve(
-    method: &dyn reconstruct::Reconstruction,
-    frame: &Frame,
-    quiet: bool,
-    stats: &mut Stats,
-) -> Result<Solution> {
-    let start = Instant::now();
-    let bar = progress::bar(quiet);
-    let report = |what: &str, share| {
-        bar.set_message(what.to_owned());
-        progress::set(&bar, share);
-    };
-    let solution = reconstruct::solve(method, frame, &Context { progress: &report })?;
-    bar.finish_and_clear();
-    stats.seconds.reconstruct = start.elapsed().as_secs_f64();
-    Ok(solution)
-}
-
-/// Writes the image to every output and takes the time.
-pub fn write(outputs: &[PathBuf], solution: &Solution, frame: &Frame, stats: &mut Stats) -> Result<()> {
-    let start = Instant::now();
-    for path in outputs {
-        io::write_color(path, &solution.image, &frame.attributes)?;
-    }
-    stats.seconds.write += start.elapsed().as_secs_f64();
-    Ok(())
 }
 
 fn report(args: &Args, stats: &stats::Stats) {

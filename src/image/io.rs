@@ -26,13 +26,15 @@ pub fn check_writable(path: &Path) -> Result<()> {
     Err(Error::io(path, format!("the extension `{extension}` is not one of {formats}")))
 }
 
-/// Writes a linear RGB image: as it is to exr and hdr; clamped and sRGB-encoded to png and jpg.
-pub fn write_color(path: &Path, image: &Image, attributes: &[(String, String)]) -> Result<()> {
+/// Writes a linear RGB image: as it is to exr and hdr; clamped and sRGB-encoded to png and jpg. An exr file gets
+/// the squared `error` of each value as layer `error`.
+pub fn write_color(path: &Path, image: &Image, error: Option<&Image>, attributes: &[(String, String)]) -> Result<()> {
     check_writable(path)?;
     let encoded = ENCODED.contains(&extension(path).as_str());
     let encode = |&value: &f32| srgb_encode(value.clamp(0.0, 1.0));
     let data = if encoded { image.data.iter().map(encode).collect() } else { image.data.clone() };
-    let pixels = Pixels {
+    let exr = extension(path) == "exr";
+    let mut pixels = Pixels {
         width: image.width,
         height: image.height,
         channels: ["R", "G", "B"].map(String::from).to_vec(),
@@ -40,7 +42,11 @@ pub fn write_color(path: &Path, image: &Image, attributes: &[(String, String)]) 
         eight_bit: encoded,
         attributes: attributes.to_vec(),
     };
-    let exr = extension(path) == "exr";
+    if let (true, Some(error)) = (exr, error) {
+        pixels.channels.extend(["error.R", "error.G", "error.B"].map(String::from));
+        let both = pixels.data.chunks_exact(3).zip(error.data.chunks_exact(3));
+        pixels.data = both.flat_map(|(value, error)| value.iter().chain(error)).copied().collect();
+    }
     write(path, &pixels, if encoded { Kind::Uint8 } else { Kind::Float }, exr.then_some("zips"))
 }
 
@@ -76,13 +82,13 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         for (name, tolerance) in [("a.exr", 0.0), ("a.hdr", 0.01), ("a.png", 0.01), ("a.jpg", 0.2)] {
             let path = folder.path().join(name);
-            write_color(&path, &image, &[]).unwrap();
+            write_color(&path, &image, None, &[]).unwrap();
             let back = read_color(&path).unwrap();
             assert_eq!(back.shape(), image.shape());
             let worst = back.data.iter().zip(&image.data).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
             assert!(worst <= tolerance, "{name}: {worst}");
         }
-        let error = write_color(&folder.path().join("a.xyz"), &image, &[]).unwrap_err();
+        let error = write_color(&folder.path().join("a.xyz"), &image, None, &[]).unwrap_err();
         assert!(error.to_string().contains("not one of exr"), "{error}");
     }
 }

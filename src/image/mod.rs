@@ -1,6 +1,8 @@
 //! Images of floats: rows from the top, channels interleaved.
 
 pub mod io;
+pub mod nl_means;
+pub mod planes;
 
 use crate::math::{Rgb, vec3};
 

@@ -3,6 +3,7 @@
 pub mod discrete;
 pub mod frame;
 pub mod fresnel;
+pub mod lanes;
 pub mod quadrature;
 pub mod rng;
 pub mod warp;

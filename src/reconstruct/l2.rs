@@ -47,6 +47,6 @@ impl Reconstruction for L2 {
         for (i, value) in image.data.iter_mut().enumerate() {
             *value = channels[i % 3][i / 3] as f32;
         }
-        Ok(Solution { image, error: None })
+        Ok(Solution { image, error: None, notes: Vec::new() })
     }
 }

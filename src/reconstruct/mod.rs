@@ -1,5 +1,6 @@
 //! Reconstructions: methods that make an image of a frame.
 
+mod frgr;
 mod l2;
 mod parameters;
 mod primal;
@@ -16,12 +17,27 @@ pub struct Solution {
     pub image: Image,
     /// Expected squared error of each value, where the method knows it.
     pub error: Option<Image>,
+    /// Images on the way to it, if the context asks for them.
+    pub notes: Vec<Note>,
+}
+
+/// An intermediate image.
+#[derive(Clone, Debug)]
+pub struct Note {
+    /// What it is, in letters, digits and underscores.
+    pub name: String,
+    /// The image, in radiance.
+    pub image: Image,
 }
 
 /// What a method is given besides the frame.
 pub struct Context<'a> {
     /// Told what is being done and the finished share.
     pub progress: &'a dyn Fn(&str, f32),
+    /// Bytes that may be used besides the frame.
+    pub memory: Option<u64>,
+    /// Whether intermediate images are wanted.
+    pub notes: bool,
 }
 
 /// A method with its parameters set.
@@ -57,10 +73,10 @@ pub struct Method {
 }
 
 /// Every method.
-pub const METHODS: &[Method] = &[primal::METHOD, l2::METHOD];
+pub const METHODS: &[Method] = &[primal::METHOD, l2::METHOD, frgr::METHOD];
 
 /// The method that `render` uses when none is given.
-pub const DEFAULT: &str = "l2";
+pub const DEFAULT: &str = "frgr";
 
 /// Builds the method that a text such as `l2:alpha=0.2` names.
 pub fn parse(text: &str) -> Result<Box<dyn Reconstruction>> {
@@ -85,6 +101,9 @@ pub fn solve(method: &dyn Reconstruction, frame: &Frame, context: &Context) -> R
     let mut solution = method.reconstruct(frame, context)?;
     if let Some(direct) = frame.get(Layer::Direct) {
         solution.image.add(direct);
+    }
+    if let (Some(error), Some(variance)) = (&mut solution.error, frame.get(Layer::DirectVariance)) {
+        error.add(variance);
     }
     Ok(solution)
 }

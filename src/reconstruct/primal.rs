@@ -21,6 +21,6 @@ impl Reconstruction for Primal {
 
     fn reconstruct(&self, frame: &Frame, _context: &Context) -> Result<Solution> {
         let image = frame.require(Layer::Color)?.clone();
-        Ok(Solution { image, error: frame.get(Layer::ColorVariance).cloned() })
+        Ok(Solution { image, error: frame.get(Layer::ColorVariance).cloned(), notes: Vec::new() })
     }
 }

@@ -1,4 +1,7 @@
 //! Solvers on image grids.
 
 pub mod dct;
+pub mod graph;
+pub mod multigrid;
 pub mod poisson;
+pub mod simplex;

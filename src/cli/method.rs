@@ -1,0 +1,78 @@
+//! What `render` and `reconstruct` have in common: a method, its image, and what it left on the way.
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use anyhow::{Context as _, Result};
+use fluxion::error::Error;
+use fluxion::film::Frame;
+use fluxion::image::io;
+use fluxion::reconstruct::{self, Context, Reconstruction, Solution};
+
+use super::progress;
+use super::stats::Stats;
+
+/// Options of the reconstruction.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Reconstruction with its parameters; `fluxion info --methods` lists them
+    #[arg(long, default_value = reconstruct::DEFAULT, value_name = "NAME[:KEY=VALUE,...]")]
+    pub method: String,
+    /// Megabytes that the reconstruction may use besides the layers; the image is the same
+    #[arg(long, value_name = "MB", value_parser = clap::value_parser!(u64).range(1..1 << 40))]
+    max_memory: Option<u64>,
+    /// Folder for the images that the method makes on its way, as EXR files
+    #[arg(long, value_name = "DIR")]
+    notes: Option<PathBuf>,
+}
+
+impl Args {
+    /// The method, after making sure that its notes can be written.
+    pub fn make(&self) -> Result<Box<dyn Reconstruction>> {
+        let method = reconstruct::parse(&self.method)?;
+        if let Some(folder) = &self.notes {
+            std::fs::create_dir_all(folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
+        }
+        Ok(method)
+    }
+
+    /// Reconstructs with progress, takes the time and writes the notes.
+    pub fn solve(
+        &self,
+        method: &dyn Reconstruction,
+        frame: &Frame,
+        quiet: bool,
+        stats: &mut Stats,
+    ) -> Result<Solution> {
+        let start = Instant::now();
+        let bar = progress::bar(quiet);
+        let report = |what: &str, share| {
+            bar.set_message(what.to_owned());
+            progress::set(&bar, share);
+        };
+        let memory = self.max_memory.map(|megabytes| megabytes << 20);
+        let context = Context { progress: &report, memory, notes: self.notes.is_some() };
+        let solution = reconstruct::solve(method, frame, &context)?;
+        bar.finish_and_clear();
+        stats.seconds.reconstruct = start.elapsed().as_secs_f64();
+        if let Some(folder) = &self.notes {
+            if solution.notes.is_empty() {
+                eprintln!("warning: the method {} makes nothing on its way", self.method);
+            }
+            for note in &solution.notes {
+                io::write_color(&folder.join(format!("{}.exr", note.name)), &note.image, None, &frame.attributes)?;
+            }
+        }
+        Ok(solution)
+    }
+}
+
+/// Writes the image to every output, with the estimated error where the format has layers, and takes the time.
+pub fn write(outputs: &[PathBuf], solution: &Solution, frame: &Frame, stats: &mut Stats) -> Result<(), Error> {
+    let start = Instant::now();
+    for path in outputs {
+        io::write_color(path, &solution.image, solution.error.as_ref(), &frame.attributes)?;
+    }
+    stats.seconds.write += start.elapsed().as_secs_f64();
+    Ok(())
+}

@@ -1,0 +1,247 @@
+//! Robust denoising using feature and colour information (Rousselle et al. 2013): three filters of different
+//! sensitivity, of which each pixel takes the one with the least estimated error.
+
+use super::distance::{Other, Patches};
+use super::{Guides, Settings, filter, offsets};
+use crate::image::planes::{Planes, Tile};
+use crate::math::lanes::{LANES, Lanes};
+
+/// What the three filters compare colours by: two sizes of patch, and not at all.
+const PATCHES: [usize; 2] = [1, 3];
+const COLOR_TOLERANCE: f32 = 0.45;
+const FEATURE_TOLERANCE: f32 = 0.6;
+
+/// Which variant of the method.
+#[derive(Clone, Copy, Debug)]
+pub struct Options {
+    /// Radius of the window.
+    pub window: usize,
+    /// Whether opposite pixels whose mean fits better than they do are weighted by how well it does.
+    pub symmetric: bool,
+    /// Whether estimated errors and the choice between the filters are smoothed.
+    pub smooth_choice: bool,
+    /// Most rows to work on at a time; the result does not depend on it.
+    pub rows: usize,
+}
+
+/// A denoised image and its estimated squared error, mean over the channels.
+pub struct Denoised {
+    /// The image.
+    pub image: Planes,
+    /// Stein's unbiased estimate of its squared error, smoothed; may be negative.
+    pub error: Planes,
+}
+
+/// Rows that smoothing the errors and the choice between the filters looks beyond a band.
+const OVERLAP: usize = 4;
+
+/// Denoises a colour image; `progress` is told the finished share.
+pub fn denoise(guides: &Guides, options: Options, progress: &dyn Fn(f32)) -> Denoised {
+    let (width, height) = (guides.color.mean.width, guides.color.mean.height);
+    let mut all = Denoised { image: Planes::new(width, height, 3), error: Planes::new(width, height, 1) };
+    for y in (0..height).step_by(options.rows) {
+        let rows = y..height.min(y + options.rows);
+        let top = y.saturating_sub(OVERLAP);
+        let bottom = height.min(rows.end + OVERLAP);
+        let band = denoise_band(&guides.band(top, bottom - top), options);
+        all.image.put_rows(rows.clone(), &band.image, y - top);
+        all.error.put_rows(rows.clone(), &band.error, y - top);
+        progress(rows.end as f32 / height as f32);
+    }
+    all.image.mirror_border();
+    all.error.mirror_border();
+    all
+}
+
+fn denoise_band(guides: &Guides, options: Options) -> Denoised {
+    let (width, height) = (guides.color.mean.width, guides.color.mean.height);
+    let candidates = Planes::from_tiles(width, height, 3 * 5, |tile| denoise_tile(guides, tile, options));
+    let errors = candidates.part(9, 3);
+    let smooth = Settings { window: 1, patch: 3, color: 1.0, feature: None };
+    let errors = if options.smooth_choice { filter(&errors, guides, smooth) } else { errors };
+    let best = |x: isize, y: isize| {
+        let slope = |k: usize| candidates.at(12 + k, x, y);
+        let first = usize::from(options.smooth_choice && slope(0) >= slope(1));
+        (first..3).min_by(|&a, &b| errors.at(a, x, y).total_cmp(&errors.at(b, x, y))).unwrap_or(2)
+    };
+    let mut choice =
+        Planes::from_fn(width, height, 3, |k, x, y| f32::from(u8::from(best(x as isize, y as isize) == k)));
+    if options.smooth_choice {
+        let smooth = Settings { window: 3, patch: 1, color: 0.5, feature: Some(FEATURE_TOLERANCE) };
+        choice = filter(&choice, guides, smooth);
+    }
+    let blend = |from: &Planes, first: usize, step: usize, x: usize, y: usize| {
+        let (x, y) = (x as isize, y as isize);
+        (0..3).map(|k| choice.at(k, x, y) * from.at(first + step * k, x, y)).sum()
+    };
+    Denoised {
+        image: Planes::from_fn(width, height, 3, |c, x, y| blend(&candidates, c, 3, x, y)),
+        error: Planes::from_fn(width, height, 1, |_, x, y| blend(&errors, 0, 1, x, y)),
+    }
+}
+
+/// Sums of one filter over the windows of some pixels.
+#[derive(Clone, Copy)]
+struct Sums {
+    weight: Lanes,
+    largest: Lanes,
+    /// Of differences to the centre.
+    color: [Lanes; 3],
+    /// What the weights' own dependence on the centre's colour adds to the slope of the result.
+    bend: Lanes,
+    lean: [Lanes; 3],
+}
+
+const EMPTY: Sums = Sums {
+    weight: Lanes::ZERO,
+    largest: Lanes::ZERO,
+    color: [Lanes::ZERO; 3],
+    bend: Lanes::ZERO,
+    lean: [Lanes::ZERO; 3],
+};
+
+/// A pixel of the window, seen from the centre.
+struct Neighbour {
+    step: [Lanes; 3],
+    square: Lanes,
+    /// What distances are divided by.
+    noise: Lanes,
+}
+
+impl Neighbour {
+    #[inline(always)]
+    fn new(guides: &Guides, (x, y): (isize, isize), (dx, dy): (isize, isize)) -> Self {
+        let color = &guides.color;
+        let difference = |planes: &Planes, c: usize| {
+            (Lanes::load(planes.from(c, x, y)), Lanes::load(planes.from(c, x + dx, y + dy)))
+        };
+        let step = [0, 1, 2].map(|c| {
+            let (here, there) = difference(&color.mean, c);
+            there - here
+        });
+        let (here, there) = difference(&color.variance, 0);
+        let noise = Lanes::splat(1e-10) + Lanes::splat(COLOR_TOLERANCE * COLOR_TOLERANCE) * (here + there);
+        Self { step, square: step[0] * step[0] + step[1] * step[1] + step[2] * step[2], noise }
+    }
+}
+
+impl Sums {
+    /// Adds a pixel; `follows` is its weight where that depends on the colour, and zero elsewhere.
+    #[inline(always)]
+    fn add(&mut self, pixel: &Neighbour, weight: Lanes, follows: Lanes) {
+        self.weight += weight;
+        self.largest = self.largest.max(weight);
+        let follows = follows / pixel.noise;
+        self.bend += follows * pixel.square;
+        for c in 0..3 {
+            self.color[c] += weight * pixel.step[c];
+            self.lean[c] += follows * pixel.step[c];
+        }
+    }
+}
+
+/// Distances by colour of the filter `k`, and the largest by any feature.
+#[inline(always)]
+fn alike(patches: &Patches, k: usize, x: usize, y: usize) -> Lanes {
+    if k < 2 { patches.mean(k, PATCHES[k], x, y) } else { Lanes::ZERO }
+}
+
+/// Nine planes of filtered colours, three of errors, three of slopes.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
+fn denoise_tile(guides: &Guides, tile: Tile, options: Options) -> Vec<f32> {
+    let width = tile.width.next_multiple_of(LANES);
+    let mut sums = vec![[EMPTY; 3]; tile.height * width / LANES];
+    if options.symmetric {
+        add_pairs(guides, tile, options.window, &mut sums);
+    } else {
+        add_pixels(guides, tile, options.window, &mut sums);
+    }
+    finish(guides, tile, &sums)
+}
+
+/// Blocks of a tile.
+#[inline(always)]
+fn blocks(tile: Tile) -> impl Iterator<Item = (usize, usize)> {
+    (0..tile.height).flat_map(move |y| (0..tile.width).step_by(LANES).map(move |x| (x, y)))
+}
+
+#[inline(always)]
+fn add_pixels(guides: &Guides, tile: Tile, window: usize, sums: &mut [[Sums; 3]]) {
+    let mut patches = Patches::new(tile, PATCHES[1], 2);
+    for (dx, dy) in offsets(window) {
+        let other = Other::At(dx, dy);
+        patches.compare(&guides.color, other, COLOR_TOLERANCE * COLOR_TOLERANCE, &PATCHES);
+        for ((x, y), sums) in blocks(tile).zip(&mut *sums) {
+            let at = ((tile.x + x) as isize, (tile.y + y) as isize);
+            let pixel = Neighbour::new(guides, at, (dx, dy));
+            let apart = guides.apart(at, other, FEATURE_TOLERANCE * FEATURE_TOLERANCE);
+            for (k, sums) in sums.iter_mut().enumerate() {
+                let alike = alike(&patches, k, x, y);
+                let weight = (Lanes::ZERO - alike.max(apart)).exp_negative();
+                sums.add(&pixel, weight, weight.where_greater(alike, apart, Lanes::ZERO));
+            }
+        }
+    }
+}
+
+/// Like [`add_pixels`]; but where the mean of two opposite pixels is more like the centre than they are together,
+/// as on a ramp, both get its weight. Pixels that are far off, each for itself, stay out.
+#[inline(always)]
+fn add_pairs(guides: &Guides, tile: Tile, window: usize, sums: &mut [[Sums; 3]]) {
+    const FAR: f32 = 25.0;
+    let mut patches: [Patches; 3] = std::array::from_fn(|_| Patches::new(tile, PATCHES[1], 2));
+    for (dx, dy) in offsets(window).filter(|&(dx, dy)| dy > 0 || (dy == 0 && dx > 0)) {
+        let others = [Other::At(dx, dy), Other::At(-dx, -dy), Other::Mean(dx, dy)];
+        for (patches, other) in patches.iter_mut().zip(others) {
+            patches.compare(&guides.color, other, COLOR_TOLERANCE * COLOR_TOLERANCE, &PATCHES);
+        }
+        for ((x, y), sums) in blocks(tile).zip(&mut *sums) {
+            let at = ((tile.x + x) as isize, (tile.y + y) as isize);
+            let pixels = [Neighbour::new(guides, at, (dx, dy)), Neighbour::new(guides, at, (-dx, -dy))];
+            let apart = others.map(|other| guides.apart(at, other, FEATURE_TOLERANCE * FEATURE_TOLERANCE));
+            for (k, sums) in sums.iter_mut().enumerate() {
+                let alike = [0, 1, 2].map(|i| alike(&patches[i], k, x, y));
+                let far = [0, 1, 2].map(|i| alike[i].max(apart[i]));
+                let weight = far.map(|far| (Lanes::ZERO - far).exp_negative());
+                let gain = (weight[2] / (weight[0] + weight[1]) - Lanes::splat(1.0)).max(Lanes::ZERO);
+                let share = gain.min(Lanes::splat(1.0));
+                let share = share.where_greater(Lanes::splat(FAR), far[0].max(far[1]), Lanes::ZERO);
+                for i in 0..2 {
+                    let joint = weight[i] + share * (weight[2] - weight[i]);
+                    sums.add(&pixels[i], joint, weight[i].where_greater(alike[i], apart[i], Lanes::ZERO));
+                }
+            }
+        }
+    }
+}
+
+/// Results from the sums, the centre included.
+#[inline(always)]
+fn finish(guides: &Guides, tile: Tile, sums: &[[Sums; 3]]) -> Vec<f32> {
+    let color = &guides.color;
+    let mut out = vec![0.0; 15 * tile.width * tile.height];
+    for ((x, y), sums) in blocks(tile).zip(sums) {
+        let load = |planes: &Planes, c| Lanes::load(planes.from(c, (tile.x + x) as isize, (tile.y + y) as isize));
+        let noise = load(&color.variance, 0);
+        for (k, sums) in sums.iter().enumerate() {
+            let side = 2 * PATCHES[k.min(1)] + 1;
+            let centre = sums.largest.max(Lanes::splat(1e-3));
+            let total = sums.weight + centre;
+            let (mut error, mut bend) = (Lanes::ZERO - noise, sums.bend);
+            for c in 0..3 {
+                let step = sums.color[c] / total;
+                tile.put(&mut out, 3 * k + c, x, y, load(&color.mean, c) + step);
+                error += step * step;
+                bend = bend - step * sums.lean[c];
+            }
+            // dF/du, mean over the channels; outside [0, 1] it is not believed.
+            let direct = centre / total;
+            let follows = Lanes::splat(2.0 / (3 * side * side) as f32) * noise * bend / total;
+            let slope = direct + if k < 2 { follows } else { Lanes::ZERO };
+            let slope = direct.where_greater(Lanes::ZERO, slope, direct.where_greater(slope, Lanes::splat(1.0), slope));
+            tile.put(&mut out, 9 + k, x, y, Lanes::splat(1.0 / 3.0) * (error + Lanes::splat(2.0) * noise * slope));
+            tile.put(&mut out, 12 + k, x, y, slope);
+        }
+    }
+    out
+}

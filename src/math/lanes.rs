@@ -1,0 +1,152 @@
+//! Sixteen floats that are worked on together. Written so that compilers turn every operation into vector
+//! instructions of whatever width the function around it is compiled for; the bits are the same for all of them.
+
+use std::ops::{Add, AddAssign, Div, Mul, Sub};
+
+/// Number of floats.
+pub const LANES: usize = 16;
+
+/// The floats.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(align(64))]
+pub struct Lanes(pub [f32; LANES]);
+
+impl Lanes {
+    /// All zero.
+    pub const ZERO: Self = Self([0.0; LANES]);
+
+    /// The same value everywhere.
+    #[inline(always)]
+    pub fn splat(value: f32) -> Self {
+        Self([value; LANES])
+    }
+
+    /// The first [`LANES`] values of a slice.
+    #[inline(always)]
+    pub fn load(from: &[f32]) -> Self {
+        let mut lanes = [0.0; LANES];
+        lanes.copy_from_slice(&from[..LANES]);
+        Self(lanes)
+    }
+
+    /// Writes to the first [`LANES`] places of a slice.
+    #[inline(always)]
+    pub fn store(self, to: &mut [f32]) {
+        to[..LANES].copy_from_slice(&self.0);
+    }
+
+    #[inline(always)]
+    fn map(self, f: impl Fn(f32) -> f32) -> Self {
+        let mut out = self.0;
+        for value in &mut out {
+            *value = f(*value);
+        }
+        Self(out)
+    }
+
+    #[inline(always)]
+    fn zip(self, other: Self, f: impl Fn(f32, f32) -> f32) -> Self {
+        let mut out = self.0;
+        for (a, b) in out.iter_mut().zip(other.0) {
+            *a = f(*a, b);
+        }
+        Self(out)
+    }
+
+    /// The smaller ones; those of `other` where this is NaN.
+    #[inline(always)]
+    pub fn min(self, other: Self) -> Self {
+        self.zip(other, |a, b| if a < b { a } else { b })
+    }
+
+    /// The larger ones; those of `other` where this is NaN.
+    #[inline(always)]
+    pub fn max(self, other: Self) -> Self {
+        self.zip(other, |a, b| if a > b { a } else { b })
+    }
+
+    /// Square roots.
+    #[inline(always)]
+    pub fn sqrt(self) -> Self {
+        self.map(f32::sqrt)
+    }
+
+    /// These where `a > b`, and `other` elsewhere.
+    #[inline(always)]
+    pub fn where_greater(self, a: Self, b: Self, other: Self) -> Self {
+        let mut out = self.0;
+        for (i, value) in out.iter_mut().enumerate() {
+            *value = if a.0[i] > b.0[i] { *value } else { other.0[i] };
+        }
+        Self(out)
+    }
+
+    /// e^x for x <= 0, to a relative 1e-6; less than 1e-36 where x is below -85.
+    #[inline(always)]
+    pub fn exp_negative(self) -> Self {
+        // Adding 1.5 * 2^23 leaves the nearest integer in the low bits.
+        const ROUND: f32 = 12_582_912.0;
+        let x = self.max(Self::splat(-85.0)) * Self::splat(std::f32::consts::LOG2_E);
+        let shifted = x + Self::splat(ROUND);
+        let f = (x - (shifted - Self::splat(ROUND))) * Self::splat(std::f32::consts::LN_2);
+        let power = shifted.map(|shifted| f32::from_bits((shifted.to_bits() << 23).wrapping_add(127 << 23)));
+        let terms = [0.001_393, 0.008_375_2, 0.041_665_82, 0.166_666_57, 0.5, 1.0, 1.0];
+        power * terms.into_iter().fold(Self::ZERO, |sum, term| sum * f + Self::splat(term))
+    }
+}
+
+macro_rules! operator {
+    ($trait:ident, $name:ident, $operator:tt) => {
+        impl $trait for Lanes {
+            type Output = Self;
+            #[inline(always)]
+            fn $name(self, other: Self) -> Self {
+                self.zip(other, |a, b| a $operator b)
+            }
+        }
+    };
+}
+
+operator!(Add, add, +);
+operator!(Sub, sub, -);
+operator!(Mul, mul, *);
+operator!(Div, div, /);
+
+impl AddAssign for Lanes {
+    #[inline(always)]
+    fn add_assign(&mut self, other: Self) {
+        *self = *self + other;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_exponential_is_one() {
+        for i in 0..100_000 {
+            let x = -85.0 * i as f32 / 100_000.0;
+            let (ours, exact) = (f64::from(Lanes::splat(x).exp_negative().0[3]), f64::from(x).exp());
+            assert!((ours / exact - 1.0).abs() < 1e-6 + 1e-7 * f64::from(-x), "{x}: {ours} instead of {exact}");
+        }
+        assert_eq!(Lanes::ZERO.exp_negative(), Lanes::splat(1.0));
+        assert!(Lanes::splat(-1e30).exp_negative().0[0] < 1e-36);
+    }
+
+    #[test]
+    fn operations_work_on_every_lane() {
+        let a = Lanes(std::array::from_fn(|i| i as f32));
+        let b = Lanes::splat(4.0);
+        for i in 0..LANES {
+            let x = i as f32;
+            assert_eq!((a + b).0[i], x + 4.0);
+            assert_eq!((a - b).0[i], x - 4.0);
+            assert_eq!((a * b / b).0[i], x);
+            assert_eq!((a.min(b).0[i], a.max(b).0[i]), (x.min(4.0), x.max(4.0)));
+            assert_eq!(a.where_greater(a, b, b).0[i], x.max(4.0));
+            assert_eq!(a.sqrt().0[i], x.sqrt());
+        }
+        assert_eq!(Lanes::splat(f32::NAN).max(b), b);
+    }
+}

@@ -1,0 +1,133 @@
+//! Gradient enhancement: the image whose differences are nearest to the sampled ones, by weights on every edge,
+//! without straying from the denoised image. Differences of an image are consistent: they add up to the same along
+//! every way.
+
+use rayon::prelude::*;
+
+use super::form::Form;
+use super::level::Level;
+use crate::image::planes::Planes;
+use crate::math::rng;
+use crate::solve::graph::{Graph, Quad};
+use crate::solve::multigrid::Multigrid;
+
+/// Pull towards the denoised image in the authors' form. Their gradient descent starts there and stops after a
+/// thousand small steps; a penalty of this weight acts alike on every frequency (docs/frgr.md).
+const CODE_SCREEN: f32 = 100.0;
+
+/// In the printed form only the differences matter; without any pull the equations would have no single solution.
+const PAPER_SCREEN: f32 = 1e-3;
+
+/// A denoised pixel is not believed to have less than this share of its variance as error: its estimate is noisy.
+const LEAST_ERROR: f32 = 0.1;
+
+/// Variance that differences and denoised colours have at least, in squares of the typical luminance.
+const LEAST_VARIANCE: f32 = 1e-6;
+
+/// Residuals are brought down to this share. What is left is well below the noise of the data.
+const TOLERANCE: f64 = 0.02;
+
+/// An enhanced image with what is known of its error.
+pub struct Enhanced {
+    /// Its differences are the enhanced gradients.
+    pub image: Planes,
+    /// Estimated squared error, mean over the channels, if weights are by noise.
+    pub error: Option<Planes>,
+}
+
+/// Weights of an edge: of the sampled difference, and of a difference of zero.
+struct Weight {
+    sampled: f32,
+    flat: f32,
+}
+
+impl Weight {
+    fn sum(&self) -> f32 {
+        self.sampled + self.flat
+    }
+}
+
+/// Enhances the gradients of a level. `error` is the estimated squared error of the denoised image.
+pub fn enhance(level: &Level, denoised: &Planes, error: &Planes, form: Form, spp: f32) -> Enhanced {
+    let (width, height) = (denoised.width, denoised.height);
+    let each = |value: &(dyn Fn(usize, usize) -> f32 + Sync)| -> Vec<f32> {
+        (0..width * height).into_par_iter().map(|i| value(i % width, i / width)).collect()
+    };
+    // Weight of every edge, and what share of the sampled difference remains beside the pull towards zero.
+    let edge = |axis: usize, x: usize, y: usize| weight(level, form, spp, axis, (x as isize, y as isize));
+    let [across, down] = [0, 1].map(|axis| each(&|x, y| edge(axis, x, y).sum()));
+    let screen = each(&|x, y| screen(level, error, form, x as isize, y as isize));
+    let pull = |axis: usize, c: usize, x: usize, y: usize| {
+        edge(axis, x, y).sampled * level.gradients[axis].at(c, x as isize, y as isize)
+    };
+    let start = |i: usize| {
+        let value = |c| denoised.at(c, (i % width) as isize, (i / width) as isize);
+        [value(0), value(1), value(2), 0.0]
+    };
+    // Right-hand sides of the normal equations; the fourth is random signs, for the error.
+    let right = |i: usize| {
+        let (x, y) = (i % width, i / width);
+        let value = |c: usize| {
+            let mut sum = screen[i] * start(i)[c];
+            sum += if x > 0 { pull(0, c, x - 1, y) } else { 0.0 } - if x + 1 < width { pull(0, c, x, y) } else { 0.0 };
+            sum += if y > 0 { pull(1, c, x, y - 1) } else { 0.0 } - if y + 1 < height { pull(1, c, x, y) } else { 0.0 };
+            sum
+        };
+        [value(0), value(1), value(2), sign(i)]
+    };
+    let right: Vec<Quad> = (0..width * height).into_par_iter().map(right).collect();
+    let solver = Multigrid::new(Graph::from_grid(width, &across, &down, &screen));
+    let solved = solver.solve(&right, (0..width * height).map(start).collect(), TOLERANCE).x;
+    let image = Planes::from_fn(width, height, 3, |c, x, y| solved[y * width + x][c]);
+    let error = (form == Form::Best).then(|| {
+        // The inverse of the matrix is the covariance of the errors when all weights are inverse variances. The
+        // expectation of z times (inverse z) over random signs z is its diagonal; the mean over some pixels stands for
+        // it. Gradients only add to what is known: the error is no larger than the denoised image's.
+        let most = Planes::from_fn(width, height, 1, |_, x, y| 1.0 / screen[y * width + x]);
+        let sample = Planes::from_fn(width, height, 1, |_, x, y| sign(y * width + x) * solved[y * width + x][3]);
+        let clipped = |sample: &Planes| sample.zip(&most, |value, most| value.clamp(0.0, most));
+        clipped(&clipped(&sample).box_mean(2))
+    });
+    Enhanced { image, error }
+}
+
+/// Plus or minus one, at random by position.
+fn sign(i: usize) -> f32 {
+    if rng::mix(i as u64 + 1) & 1 == 0 { 1.0 } else { -1.0 }
+}
+
+fn weight(level: &Level, form: Form, spp: f32, axis: usize, (x, y): (isize, isize)) -> Weight {
+    if form == Form::Best {
+        return Weight { sampled: 1.0 / (level.noise[axis].at(0, x, y) + LEAST_VARIANCE), flat: 0.0 };
+    }
+    // Yan et al. 2024, eqs. 10 to 14; with the sum over RGB for the size of a difference, so that channels share
+    // their weights.
+    let (nx, ny) = if axis == 0 { (x + 1, y) } else { (x, y + 1) };
+    let sum =
+        |planes: &Planes, value: &dyn Fn(usize) -> f32| (0..planes.channels()).map(|c| value(c).abs()).sum::<f32>();
+    let gradient = &level.gradients[axis];
+    let size = sum(gradient, &|c| gradient.at(c, x, y));
+    let features = level.features.iter().map(|feature| {
+        let mean = &feature.mean;
+        sum(mean, &|c| mean.at(c, nx, ny) - mean.at(c, x, y))
+    });
+    let flat = 1.0 / (features.sum::<f32>() + 0.01);
+    let lambda = 8.0 / spp.sqrt();
+    if form == Form::Paper {
+        Weight { sampled: size / 0.09 + 1.0 / (size + 0.01), flat: lambda * flat }
+    } else {
+        let sampled = (size + 0.01) / 0.09 + 1.0 / (size + 0.01);
+        Weight { sampled: sampled * sampled, flat: lambda * flat * flat }
+    }
+}
+
+fn screen(level: &Level, error: &Planes, form: Form, x: isize, y: isize) -> f32 {
+    match form {
+        Form::Paper => PAPER_SCREEN,
+        Form::Code => CODE_SCREEN,
+        Form::Best => {
+            let variance = (0..3).map(|c| level.variance.at(c, x, y)).sum::<f32>() / 3.0;
+            1.0 / (error.at(0, x, y).max(LEAST_ERROR * variance) + LEAST_VARIANCE)
+        }
+    }
+}

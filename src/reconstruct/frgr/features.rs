@@ -1,0 +1,113 @@
+//! Albedo and normal: cleaned of their own noise, and what counts as alike in them.
+
+use crate::image::nl_means::Guide;
+use crate::image::planes::{Planes, Tile};
+use crate::math::lanes::{LANES, Lanes};
+
+/// A feature of three channels.
+pub struct Feature {
+    /// Which one.
+    pub kind: Kind,
+    /// The values.
+    pub mean: Planes,
+    /// Variance of the mean, sum over the channels.
+    pub variance: Planes,
+}
+
+/// Features that are used.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Material colour.
+    Albedo,
+    /// Shading normal.
+    Normal,
+}
+
+/// Beyond three pixels the weights of [`Feature::clean`] are under e^-9.
+const RADIUS: isize = 3;
+
+/// Squared differences of less than this per channel count as alike.
+const ALIKE: f32 = 1e-3;
+
+impl Feature {
+    /// A feature cleaned by a bilateral filter: pixels whose difference noise explains are averaged.
+    pub fn clean(kind: Kind, mean: &Planes, variance: &Planes) -> Self {
+        let noise = variance.sum();
+        let planes = Planes::from_tiles(mean.width, mean.height, 4, |tile| clean_tile(mean, &noise, tile));
+        Self { kind, mean: planes.part(0, 3), variance: planes.part(3, 1) }
+    }
+
+    /// What pixels are compared by: differences of up to the noise, or to those between neighbours, are tolerated.
+    pub fn guide(&self) -> Guide {
+        let mean = &self.mean;
+        let tolerance = Planes::from_fn(mean.width, mean.height, 1, |_, x, y| {
+            let (x, y) = (x as isize, y as isize);
+            let squares = |c: usize| {
+                let here = mean.at(c, x, y);
+                let half = |dx: isize, dy: isize| ((mean.at(c, x + dx, y + dy) - here) * 0.5).powi(2);
+                let slope = half(1, 0).min(half(-1, 0)) + half(0, 1).min(half(0, -1));
+                slope.max(ALIKE)
+            };
+            (squares(0) + squares(1) + squares(2)).max(self.variance.at(0, x, y))
+        });
+        Guide { mean: mean.clone(), variance: self.variance.clone(), tolerance: Some(tolerance) }
+    }
+}
+
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
+fn clean_tile(mean: &Planes, noise: &Planes, tile: Tile) -> Vec<f32> {
+    let mut out = vec![0.0; 4 * tile.width * tile.height];
+    let blocks = (0..tile.height).flat_map(|y| (0..tile.width).step_by(LANES).map(move |x| (x, y)));
+    for (x, y) in blocks {
+        let at = ((tile.x + x) as isize, (tile.y + y) as isize);
+        let load = |planes: &Planes, c: usize, dx: isize, dy: isize| Lanes::load(planes.from(c, at.0 + dx, at.1 + dy));
+        let centre = [0, 1, 2].map(|c| load(mean, c, 0, 0));
+        let here = load(noise, 0, 0, 0);
+        let tolerance = (here * Lanes::splat(100.0)).max(Lanes::splat(1e-4));
+        let (mut total, mut variance, mut sums) = (Lanes::ZERO, Lanes::ZERO, [Lanes::ZERO; 3]);
+        for (dx, dy) in (-RADIUS..=RADIUS).flat_map(|dy| (-RADIUS..=RADIUS).map(move |dx| (dx, dy))) {
+            let values = [0, 1, 2].map(|c| load(mean, c, dx, dy));
+            let there = load(noise, 0, dx, dy);
+            let mut beyond = Lanes::ZERO - (here + there);
+            for c in 0..3 {
+                beyond += (values[c] - centre[c]) * (values[c] - centre[c]);
+            }
+            let far = beyond.max(Lanes::ZERO) / tolerance + Lanes::splat((dx * dx + dy * dy) as f32);
+            let weight = (Lanes::ZERO - far).exp_negative();
+            total += weight;
+            variance += weight * weight * there;
+            for c in 0..3 {
+                sums[c] += weight * values[c];
+            }
+        }
+        for (c, sum) in sums.into_iter().enumerate() {
+            tile.put(&mut out, c, x, y, sum / total);
+        }
+        tile.put(&mut out, 3, x, y, variance / (total * total));
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::rng::{combine, unit};
+
+    #[test]
+    fn noise_goes_and_edges_stay() {
+        let truth = |x: usize| if x < 20 { 0.2 } else { 0.8 };
+        let noise = 0.05f32;
+        let sample = |c: usize, x: usize, y: usize| unit(combine(c as u64, (y * 64 + x) as u64)) - 0.5;
+        let noisy = Planes::from_fn(40, 30, 3, |c, x, y| truth(x) + noise * 12f32.sqrt() * sample(c, x, y));
+        let variance = Planes::from_fn(40, 30, 3, |_, _, _| noise * noise);
+        let clean = Feature::clean(Kind::Albedo, &noisy, &variance);
+        let error = |planes: &Planes| {
+            let pixels = (0..30).flat_map(|y| (0..40).map(move |x| (x, y)));
+            pixels.map(|(x, y)| (planes.at(0, x, y) - truth(x as usize)).powi(2)).sum::<f32>() / 1200.0
+        };
+        assert!(error(&clean.mean) < 0.4 * error(&noisy), "{} of {}", error(&clean.mean), error(&noisy));
+        let exact = Planes::from_fn(40, 30, 3, |_, x, _| truth(x));
+        let still = Feature::clean(Kind::Albedo, &exact, &Planes::new(40, 30, 3));
+        assert!((0..40).all(|x| (still.mean.at(1, x, 9) - truth(x as usize)).abs() < 1e-6));
+    }
+}

@@ -1,0 +1,316 @@
+//! FRGR, multi-scale filtering reconstruction for gradient-domain rendering (Yan et al. 2024).
+//!
+//! ```text
+//! gradients ─ outliers ──────────┐                                 coarse level, the same way ─┐
+//! features ── clean ─┐           ├─ enhance ─ an image of the best ─┐                          │ up
+//! colour ─────────── denoise ────┘            differences           ├─ filter ─ result ────────┘
+//!                    └── resample: choices for going down and up ───┘
+//! ```
+//!
+//! Every pixel of the result is a convex combination of the sampled colours around it. What their differences should
+//! be is known from the gradients, enhanced into those of an image; how much noise they carry from their variances.
+
+mod enhance;
+mod features;
+mod filter;
+mod form;
+mod level;
+mod outliers;
+mod pyramid;
+mod resample;
+
+use std::borrow::Cow;
+
+use self::enhance::{Enhanced, enhance};
+use self::features::{Feature, Kind};
+use self::filter::{Problem, Solver, Term};
+use self::form::Form;
+use self::level::{Inputs, Level};
+use self::resample::Resampling;
+use super::{Context, Method, Note, Parameter, Parameters, Reconstruction, Solution};
+use crate::error::{Error, Result};
+use crate::film::{Frame, Layer, Needs};
+use crate::image::Image;
+use crate::image::nl_means::rdfc::{self, Denoised};
+use crate::image::nl_means::{Guide, Guides};
+use crate::image::planes::Planes;
+use crate::solve::poisson;
+
+const fn parameter(name: &'static str, default: &'static str, summary: &'static str) -> Parameter {
+    Parameter { name, default, summary }
+}
+
+/// `frgr`.
+pub const METHOD: Method = Method {
+    id: "frgr",
+    summary: "colours filtered by weights that gradients and features guide, on several scales; consistent",
+    parameters: &[
+        parameter("levels", "2", "resolutions that are worked on, 1 to 8, each half of the one before"),
+        parameter("radius", "4", "radius of the gradient-guided filter's window, 1 to 10 pixels"),
+        parameter("form", "best", "`paper`: as published; `code`: as its authors' program; `best`: as measures best"),
+        parameter("solver", "sweeps", "of the filter's weights: `sweeps`, stopped early, or `exact`, slower"),
+        parameter("resample", "glu", "between resolutions: `glu`, guided linear upsampling, or `bilinear`"),
+        parameter("albedo", "on", "whether the albedo guides, `on` or `off`; left out when the layer is missing"),
+        parameter("normal", "on", "whether the normal guides, `on` or `off`; left out when the layer is missing"),
+        parameter("denoised", "on", "whether the filter is held near the denoised image, `on` or `off`"),
+        parameter("enhance", "on", "whether gradients are weighted by their worth, `on` or `off`"),
+    ],
+    make,
+};
+
+struct Frgr {
+    levels: usize,
+    radius: usize,
+    form: Form,
+    solver: Solver,
+    guided: bool,
+    features: Vec<Kind>,
+    denoised: bool,
+    enhance: bool,
+}
+
+fn make(parameters: &Parameters) -> Result<Box<dyn Reconstruction>> {
+    let switch = |name: &str| {
+        let text: String = parameters.get(name, "on or off", |text: &String| ["on", "off"].contains(&text.as_str()))?;
+        Ok::<_, Error>(text == "on")
+    };
+    let resample: String =
+        parameters.get("resample", "glu or bilinear", |text: &String| ["glu", "bilinear"].contains(&text.as_str()))?;
+    let mut features = Vec::new();
+    for (name, kind) in [("albedo", Kind::Albedo), ("normal", Kind::Normal)] {
+        if switch(name)? {
+            features.push(kind);
+        }
+    }
+    Ok(Box::new(Frgr {
+        levels: parameters.get("levels", "a number from 1 to 8", |levels| (1..=8).contains(levels))?,
+        radius: parameters.get("radius", "a number from 1 to 10", |radius| (1..=10).contains(radius))?,
+        form: parameters.get("form", "paper, code or best", |_| true)?,
+        solver: parameters.get("solver", "sweeps or exact", |_| true)?,
+        guided: resample == "glu",
+        features,
+        denoised: switch("denoised")?,
+        enhance: switch("enhance")?,
+    }))
+}
+
+/// Floats held for every pixel besides the frame while levels are worked on, and while a band is denoised: the planes
+/// that are alive at the same time, counted and measured.
+const LEVEL_FLOATS: u64 = 130;
+const BAND_FLOATS: u64 = 45;
+
+/// A band that is worked on has at least so many rows.
+const LEAST_ROWS: u64 = 32;
+
+/// A level and its denoised image.
+struct Prepared {
+    level: Level,
+    denoised: Planes,
+    error: Planes,
+}
+
+impl Reconstruction for Frgr {
+    fn needs(&self) -> Needs {
+        Needs { features: !self.features.is_empty(), edges: true, ..Needs::default() }
+    }
+
+    fn reconstruct(&self, frame: &Frame, context: &Context) -> Result<Solution> {
+        let inputs = Inputs::new(frame, 1 << (self.levels - 1))?;
+        let rows = rows(&inputs, context.memory)?;
+        let mut notes = Notes { wanted: context.notes, size: (frame.width, frame.height), notes: Vec::new() };
+        (context.progress)("clean", 0.0);
+        let level = self.prepare(&inputs, frame)?;
+        notes.add("dx", &level.gradients[0], inputs.scale);
+        notes.add("dy", &level.gradients[1], inputs.scale);
+        let denoised = self.denoise(&level, rows, context);
+        notes.add("denoised", &denoised.image, inputs.scale);
+        let Denoised { image, error } = denoised;
+        (context.progress)("pyramid", 0.5);
+        let mut levels = vec![Prepared { level, denoised: image, error }];
+        let mut choices = Vec::new();
+        for k in 1..self.levels {
+            let (coarse, choice) = self.coarser(&levels[k - 1]);
+            notes.add(&format!("level{k}_color"), &coarse.level.color, inputs.scale);
+            levels.push(coarse);
+            choices.push(choice);
+        }
+        let mut upper: Option<[Planes; 2]> = None;
+        for k in (0..self.levels).rev() {
+            (context.progress)("enhance and filter", 1.0 - 0.45 * (k + 1) as f32 / self.levels as f32);
+            let this = levels.pop().expect("as many as are counted");
+            let enhanced = self.enhance(&this, inputs.spp);
+            notes.add(&format!("level{k}_enhanced"), &enhanced.image, inputs.scale);
+            let filtered = self.filter(&this, &enhanced.image, upper.as_ref(), inputs.spp);
+            notes.add(&format!("level{k}_filtered"), &filtered[0], inputs.scale);
+            if k == 0 {
+                let image = filtered[0].to_image(frame.width, frame.height, 1.0 / inputs.scale);
+                let error = error_image(&this, &enhanced, &inputs, frame);
+                return Ok(Solution { image, error: Some(error), notes: notes.notes });
+            }
+            let [image, variance] = filtered;
+            upper = Some([choices[k - 1].up(&image), choices[k - 1].up_variance(&variance)]);
+        }
+        unreachable!("there is a level 0")
+    }
+}
+
+impl Frgr {
+    /// The finest level: outliers removed, features cleaned, variances raised to those around.
+    fn prepare(&self, inputs: &Inputs, frame: &Frame) -> Result<Level> {
+        let [color, variance] = inputs.color()?;
+        let noise_test = self.form != Form::Code;
+        let clean = |axis: usize| {
+            let [mean, variance] = inputs.gradient(axis)?;
+            let edges = [[inputs.width - 1, inputs.height], [inputs.width, inputs.height - 1]][axis];
+            Ok::<_, Error>(outliers::remove(&mean, &variance, edges, noise_test))
+        };
+        let ([dx, dx_noise], [dy, dy_noise]) = (clean(0)?, clean(1)?);
+        let mut features = Vec::new();
+        for &kind in &self.features {
+            let (mean, variance) = match kind {
+                Kind::Albedo => (Layer::Albedo, Layer::AlbedoVariance),
+                Kind::Normal => (Layer::Normal, Layer::NormalVariance),
+            };
+            if frame.get(mean).is_some() {
+                features.push(Feature::clean(kind, &inputs.planes(mean, 1.0)?, &inputs.planes(variance, 1.0)?));
+            }
+        }
+        let level = Level { color, variance, gradients: [dx, dy], noise: [dx_noise, dy_noise], features };
+        Ok(if self.form == Form::Best { level.without_certainty() } else { level })
+    }
+
+    fn denoise(&self, level: &Level, rows: usize, context: &Context) -> Denoised {
+        let color = Guide { mean: level.color.clone(), variance: level.variance.sum(), tolerance: None };
+        let guides = Guides { color, features: level.features.iter().map(Feature::guide).collect() };
+        let options = rdfc::Options {
+            window: self.form.window(),
+            symmetric: self.form == Form::Code,
+            smooth_choice: self.form != Form::Paper,
+            rows,
+        };
+        rdfc::denoise(&guides, options, &|share| (context.progress)("denoise", 0.05 + 0.45 * share))
+    }
+
+    /// The next level, and how to get to it and back.
+    fn coarser(&self, fine: &Prepared) -> (Prepared, Resampling) {
+        let Prepared { level, denoised, error } = fine;
+        let choice = if self.guided {
+            let features = level.features.iter().map(|feature| feature.mean.map(|value| 0.1 * value));
+            Resampling::guided(&features.fold(denoised.clone(), |guide, feature| guide.and(&feature)))
+        } else {
+            Resampling::bilinear(denoised.width, denoised.height)
+        };
+        let features = level.features.iter().map(|feature| Feature {
+            kind: feature.kind,
+            mean: choice.down(&feature.mean),
+            variance: choice.down_variance(&feature.variance),
+        });
+        let coarse = Level {
+            color: choice.down(&level.color),
+            variance: choice.down_variance(&level.variance),
+            gradients: pyramid::gradients(&choice, &level.gradients),
+            noise: pyramid::variances(&choice, &level.noise),
+            features: features.collect(),
+        };
+        let prepared = Prepared { level: coarse, denoised: choice.down(denoised), error: choice.down(error) };
+        (prepared, choice)
+    }
+
+    fn enhance(&self, this: &Prepared, spp: f32) -> Enhanced {
+        if self.enhance {
+            return enhance(&this.level, &this.denoised, &this.error, self.form, spp);
+        }
+        // The image of the sampled differences as they are, all of the same weight.
+        let level = &this.level;
+        let (width, height) = (level.color.width, level.color.height);
+        let channel = |planes: &Planes, c: usize| -> Vec<f64> {
+            (0..width * height).map(|i| f64::from(planes.at(c, (i % width) as isize, (i / width) as isize))).collect()
+        };
+        let [dx, dy] = &level.gradients;
+        let solve = |c| poisson::screened(width, &channel(&level.color, c), &channel(dx, c), &channel(dy, c), 0.2);
+        let channels = [solve(0), solve(1), solve(2)];
+        let image = Planes::from_fn(width, height, 3, |c, x, y| channels[c][y * width + x] as f32);
+        Enhanced { image, error: None }
+    }
+
+    /// The filtered colour and its variance. `upper` is the result of the coarser level.
+    fn filter(&self, this: &Prepared, guide: &Planes, upper: Option<&[Planes; 2]>, spp: f32) -> [Planes; 2] {
+        let Prepared { level, denoised, .. } = this;
+        let weights = self.form.weights(spp);
+        let mut terms = vec![Term { value: Cow::Borrowed(guide), target: guide, weight: 1.0 }];
+        if self.denoised {
+            let target = if self.form == Form::Best && self.enhance { guide } else { denoised };
+            terms.push(Term { value: Cow::Borrowed(&level.color), target, weight: weights.denoised });
+        }
+        for feature in &level.features {
+            let mean = &feature.mean;
+            let weight = if feature.kind == Kind::Albedo { weights.albedo } else { weights.normal };
+            let value = match upper {
+                // In the authors' program these also ask that colour and upsampled result agree.
+                Some([up, _]) if self.form == Form::Code => {
+                    Cow::Owned(level.color.zip(up, |color, up| color - up).zip(mean, |rest, mean| rest + mean))
+                }
+                _ => Cow::Borrowed(mean),
+            };
+            if weight > 0.0 {
+                terms.push(Term { value, target: mean, weight });
+            }
+        }
+        let mut penalty = level.variance.sum();
+        if let Some([up, up_variance]) = upper {
+            terms.push(Term { value: Cow::Borrowed(up), target: up, weight: weights.upsampled });
+            if self.form != Form::Paper {
+                penalty = penalty.zip(&up_variance.sum(), |color, up| color + up);
+            }
+        }
+        let (color, variance) = (&level.color, &level.variance);
+        Problem { color, variance, penalty: &penalty, terms, radius: self.radius, solver: self.solver }.solve()
+    }
+}
+
+/// Rows that are denoised at a time, within a bound on memory.
+fn rows(inputs: &Inputs, memory: Option<u64>) -> Result<usize> {
+    let Some(memory) = memory else { return Ok(inputs.height) };
+    let (width, height) = (inputs.width as u64, inputs.height as u64);
+    let levels = 4 * LEVEL_FLOATS * width * height;
+    let row = 4 * BAND_FLOATS * width;
+    let least = levels + row * LEAST_ROWS.min(height);
+    if memory < least {
+        let needed = least.div_ceil(1 << 20);
+        return Err(Error::Usage(format!(
+            "reconstructing {width}x{height} pixels with frgr takes {needed} MB besides the layers; allow it with --max-memory {needed}"
+        )));
+    }
+    Ok(((memory - levels) / row).min(height) as usize)
+}
+
+/// Estimated squared error of every value: the channels share it by their variances.
+fn error_image(this: &Prepared, enhanced: &Enhanced, inputs: &Inputs, frame: &Frame) -> Image {
+    let variance = &this.level.variance;
+    let total = variance.sum();
+    let error = enhanced.error.as_ref().unwrap_or(&this.error);
+    let value = |c: usize, x: usize, y: usize| {
+        let (x, y) = (x as isize, y as isize);
+        let share = if total.at(0, x, y) > 0.0 { 3.0 * variance.at(c, x, y) / total.at(0, x, y) } else { 1.0 };
+        share * error.at(0, x, y).max(0.0)
+    };
+    let planes = Planes::from_fn(inputs.width, inputs.height, 3, value);
+    planes.to_image(frame.width, frame.height, 1.0 / (inputs.scale * inputs.scale))
+}
+
+/// Intermediate images, if they are wanted.
+struct Notes {
+    wanted: bool,
+    size: (usize, usize),
+    notes: Vec<Note>,
+}
+
+impl Notes {
+    fn add(&mut self, name: &str, planes: &Planes, scale: f32) {
+        if self.wanted {
+            // Coarse levels keep what they were grown by to have even sides.
+            let (width, height) = (planes.width.min(self.size.0), planes.height.min(self.size.1));
+            self.notes.push(Note { name: name.to_owned(), image: planes.to_image(width, height, 1.0 / scale) });
+        }
+    }
+}

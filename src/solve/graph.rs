@@ -1,0 +1,185 @@
+//! Graphs with weighted edges and a screening weight at every node: the matrices of weighted Poisson problems, at
+//! full resolution and coarsened.
+
+use rayon::prelude::*;
+
+/// Up to four right-hand sides or solutions at a node, which are worked on together.
+pub type Quad = [f32; 4];
+
+/// Nodes that a thread takes at a time.
+pub const CHUNK: usize = 8192;
+
+/// Times that nodes are joined in pairs for the next level.
+const ROUNDS: u32 = 3;
+
+/// Most nodes that a node of the next level stands for.
+pub const MEMBERS: usize = 1 << ROUNDS;
+
+/// A node that no coarse node stands for, since its own weight all but decides its value.
+pub const ALONE: u32 = u32::MAX;
+
+/// A symmetric matrix: on the diagonal the screening weight and the edge weights, beside it minus the edge weights.
+pub struct Graph {
+    /// Where each node's edges begin in `edges`, and the end of the last.
+    first: Vec<u32>,
+    /// Other end and weight.
+    edges: Vec<(u32, f32)>,
+    screen: Vec<f32>,
+    diagonal: Vec<f32>,
+}
+
+impl Graph {
+    /// Pixels of an image whose rows have `width` pixels, with edges to the right and downwards. What is stored
+    /// where an image has no such edge is not read.
+    pub fn from_grid(width: usize, across: &[f32], down: &[f32], screen: &[f32]) -> Self {
+        let nodes = screen.len();
+        let edges_of = |i: usize, edges: &mut Vec<(u32, f32)>| {
+            let mut add = |there: bool, to: usize, weight: &[f32], at: usize| {
+                if there && weight[at] > 0.0 {
+                    edges.push((to as u32, weight[at]));
+                }
+            };
+            add(i >= width, i.wrapping_sub(width), down, i.wrapping_sub(width));
+            add(!i.is_multiple_of(width), i.wrapping_sub(1), across, i.wrapping_sub(1));
+            add(!(i + 1).is_multiple_of(width), i + 1, across, i);
+            add(i + width < nodes, i + width, down, i);
+        };
+        Self::build(screen.to_vec(), edges_of)
+    }
+
+    /// A graph from its screening weights and a function that appends a node's edges.
+    fn build(screen: Vec<f32>, edges_of: impl Fn(usize, &mut Vec<(u32, f32)>) + Sync) -> Self {
+        let nodes = screen.len();
+        let parts: Vec<_> = (0..nodes.div_ceil(CHUNK))
+            .into_par_iter()
+            .map(|part| {
+                let range = part * CHUNK..nodes.min((part + 1) * CHUNK);
+                let (mut counts, mut edges) = (Vec::with_capacity(range.len()), Vec::new());
+                for i in range {
+                    let before = edges.len();
+                    edges_of(i, &mut edges);
+                    counts.push((edges.len() - before) as u32);
+                }
+                (counts, edges)
+            })
+            .collect();
+        let mut first = Vec::with_capacity(nodes + 1);
+        first.push(0);
+        let mut edges = Vec::with_capacity(parts.iter().map(|(_, edges)| edges.len()).sum());
+        for (counts, part) in parts {
+            counts.iter().for_each(|count| first.push(first[first.len() - 1] + count));
+            edges.extend_from_slice(&part);
+        }
+        let mut graph = Self { first, edges, diagonal: Vec::new(), screen };
+        let sum = |i: usize| graph.screen[i] + graph.edges(i).iter().map(|edge| edge.1).sum::<f32>();
+        // A node without any weight keeps its value.
+        graph.diagonal =
+            (0..nodes).into_par_iter().map(|i| Some(sum(i)).filter(|&sum| sum > 0.0).unwrap_or(1.0)).collect();
+        graph
+    }
+
+    /// Number of nodes.
+    pub fn len(&self) -> usize {
+        self.screen.len()
+    }
+
+    /// Whether there is no node.
+    pub fn is_empty(&self) -> bool {
+        self.screen.is_empty()
+    }
+
+    /// A node's edges: other end and weight.
+    #[inline(always)]
+    pub fn edges(&self, node: usize) -> &[(u32, f32)] {
+        &self.edges[self.first[node] as usize..self.first[node + 1] as usize]
+    }
+
+    /// Diagonal of the matrix.
+    pub fn diagonal(&self) -> &[f32] {
+        &self.diagonal
+    }
+
+    /// Row `node` of the matrix times `x`.
+    #[inline(always)]
+    pub fn row(&self, node: usize, x: &[Quad]) -> Quad {
+        let mut sum = x[node].map(|x| self.diagonal[node] * x);
+        for &(to, weight) in self.edges(node) {
+            (0..4).for_each(|c| sum[c] -= weight * x[to as usize][c]);
+        }
+        sum
+    }
+
+    /// Row `node` of `b` minus the matrix times `x`.
+    #[inline(always)]
+    pub fn residual(&self, node: usize, b: &[Quad], x: &[Quad]) -> Quad {
+        let row = self.row(node, x);
+        std::array::from_fn(|c| b[node][c] - row[c])
+    }
+
+    /// Joins nodes in pairs along their strongest edges. Returns what became of every node, and how many there are.
+    fn pairs(&self) -> (Vec<u32>, usize) {
+        const UNSEEN: u32 = u32::MAX - 1;
+        let mut joined = vec![UNSEEN; self.len()];
+        let mut count = 0;
+        for i in 0..self.len() {
+            if joined[i] != UNSEEN {
+                continue;
+            }
+            let strength: f32 = self.edges(i).iter().map(|edge| edge.1).sum();
+            if self.screen[i] > 4.0 * strength {
+                joined[i] = ALONE;
+                continue;
+            }
+            let strongest = self.edges(i).iter().map(|edge| edge.1).fold(0.0, f32::max);
+            let free = self.edges(i).iter().filter(|&&(to, _)| joined[to as usize] == UNSEEN);
+            let partner = free.max_by(|a, b| a.1.total_cmp(&b.1)).filter(|edge| edge.1 >= 0.25 * strongest);
+            joined[i] = count;
+            if let Some(&(to, _)) = partner {
+                joined[to as usize] = count;
+            }
+            count += 1;
+        }
+        (joined, count as usize)
+    }
+
+    /// The graph whose nodes stand for those that `joined` sends to them (Galerkin with constant interpolation).
+    fn contract(&self, joined: &[u32], count: usize) -> Self {
+        let mut members = vec![[ALONE; 2]; count];
+        let mut screen = vec![0.0; count];
+        for (i, &to) in joined.iter().enumerate().filter(|(_, to)| **to != ALONE) {
+            let slot = usize::from(members[to as usize][0] != ALONE);
+            members[to as usize][slot] = i as u32;
+            screen[to as usize] += self.screen[i];
+            // A neighbour that is left out holds its value: it screens.
+            let fixed = self.edges(i).iter().filter(|edge| joined[edge.0 as usize] == ALONE);
+            screen[to as usize] += fixed.map(|edge| edge.1).sum::<f32>();
+        }
+        Self::build(screen, |node, edges| {
+            let start = edges.len();
+            for &member in members[node].iter().filter(|&&member| member != ALONE) {
+                for &(to, weight) in self.edges(member as usize) {
+                    let to = joined[to as usize];
+                    if to == ALONE || to as usize == node {
+                        continue;
+                    }
+                    match edges[start..].iter_mut().find(|edge| edge.0 == to) {
+                        Some(edge) => edge.1 += weight,
+                        None => edges.push((to, weight)),
+                    }
+                }
+            }
+        })
+    }
+
+    /// A graph of about an eighth of the nodes, and which of them stands for each node here.
+    pub fn coarsen(&self) -> (Self, Vec<u32>) {
+        let (mut joined, count) = self.pairs();
+        let mut coarse = self.contract(&joined, count);
+        for _ in 1..ROUNDS {
+            let (again, count) = coarse.pairs();
+            coarse = coarse.contract(&again, count);
+            joined.iter_mut().filter(|to| **to != ALONE).for_each(|to| *to = again[*to as usize]);
+        }
+        (coarse, joined)
+    }
+}
