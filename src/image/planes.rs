@@ -44,7 +44,11 @@ impl Tile {
     pub fn put(&self, out: &mut [f32], c: usize, x: usize, y: usize, values: Lanes) {
         let count = LANES.min(self.width - x);
         let at = (c * self.height + y) * self.width + x;
-        out[at..at + count].copy_from_slice(&values.0[..count]);
+        if count == LANES {
+            values.store(&mut out[at..]);
+        } else {
+            out[at..at + count].copy_from_slice(&values.0[..count]);
+        }
     }
 }
 
@@ -138,9 +142,10 @@ impl Planes {
         &self.planes[c][self.index(x, y)..]
     }
 
-    /// A whole plane with its border.
-    pub fn plane(&self, c: usize) -> &[f32] {
-        &self.planes[c]
+    /// [`LANES`] values of a row from column `x` on.
+    #[inline(always)]
+    pub fn lanes(&self, c: usize, x: isize, y: isize) -> Lanes {
+        Lanes::load(self.from(c, x, y))
     }
 
     /// Rows of a plane without the border, to write in parallel. [`Planes::mirror_border`] must follow.

@@ -27,7 +27,7 @@ impl Guide {
     /// what is tolerated (Rousselle et al. 2013, eq. 4, with sums over the channels).
     #[inline(always)]
     pub fn distance(&self, (x, y): (isize, isize), other: Other, k2: f32) -> Lanes {
-        let load = |planes: &Planes, c: usize, dx: isize, dy: isize| Lanes::load(planes.from(c, x + dx, y + dy));
+        let load = |planes: &Planes, c: usize, dx: isize, dy: isize| planes.lanes(c, x + dx, y + dy);
         match other {
             Other::At(dx, dy) => self.beyond((x, y), k2, |planes, c, _| load(planes, c, dx, dy)),
             Other::Mean(dx, dy) => self.beyond((x, y), k2, |planes, c, share| {
@@ -40,7 +40,7 @@ impl Guide {
     /// argument, or just one.
     #[inline(always)]
     fn beyond(&self, (x, y): (isize, isize), k2: f32, there: impl Fn(&Planes, usize, f32) -> Lanes) -> Lanes {
-        let here = |planes: &Planes, c: usize| Lanes::load(planes.from(c, x, y));
+        let here = |planes: &Planes, c: usize| planes.lanes(c, x, y);
         let (vp, vq) = (here(&self.variance, 0), there(&self.variance, 0, 0.25));
         let mut beyond = Lanes::ZERO - (vp + vp.min(vq));
         for c in 0..self.mean.channels() {

@@ -81,7 +81,7 @@ fn filter_tile(values: &Planes, guides: &Guides, settings: Settings, tile: Tile)
             sums[0] += weight;
             sums[1] = sums[1].max(weight);
             for c in 0..channels {
-                sums[2 + c] += weight * Lanes::load(values.from(c, px + dx, py + dy));
+                sums[2 + c] += weight * values.lanes(c, px + dx, py + dy);
             }
         }
     }
@@ -90,7 +90,7 @@ fn filter_tile(values: &Planes, guides: &Guides, settings: Settings, tile: Tile)
         // The centre is like itself, but no more so than the best of the others: its noise is its own.
         let centre = sums[1].max(Lanes::splat(1e-3));
         for c in 0..channels {
-            let value = Lanes::load(values.from(c, (tile.x + x) as isize, (tile.y + y) as isize));
+            let value = values.lanes(c, (tile.x + x) as isize, (tile.y + y) as isize);
             let mean = (sums[2 + c] + centre * value) / (sums[0] + centre);
             tile.put(&mut out, c, x, y, mean);
         }

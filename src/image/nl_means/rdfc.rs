@@ -2,7 +2,7 @@
 //! sensitivity, of which each pixel takes the one with the least estimated error.
 
 use super::distance::{Other, Patches};
-use super::{Guides, Settings, filter, offsets};
+use super::{Guide, Guides, Settings, filter, offsets};
 use crate::image::planes::{Planes, Tile};
 use crate::math::lanes::{LANES, Lanes};
 
@@ -38,6 +38,9 @@ const OVERLAP: usize = 4;
 /// Denoises a colour image; `progress` is told the finished share.
 pub fn denoise(guides: &Guides, options: Options, progress: &dyn Fn(f32)) -> Denoised {
     let (width, height) = (guides.color.mean.width, guides.color.mean.height);
+    if options.rows >= height {
+        return denoise_band(guides, options);
+    }
     let mut all = Denoised { image: Planes::new(width, height, 3), error: Planes::new(width, height, 1) };
     for y in (0..height).step_by(options.rows) {
         let rows = y..height.min(y + options.rows);
@@ -111,17 +114,16 @@ struct Neighbour {
 impl Neighbour {
     #[inline(always)]
     fn new(guides: &Guides, (x, y): (isize, isize), (dx, dy): (isize, isize)) -> Self {
-        let color = &guides.color;
-        let difference = |planes: &Planes, c: usize| {
-            (Lanes::load(planes.from(c, x, y)), Lanes::load(planes.from(c, x + dx, y + dy)))
-        };
-        let step = [0, 1, 2].map(|c| {
-            let (here, there) = difference(&color.mean, c);
-            there - here
-        });
-        let (here, there) = difference(&color.variance, 0);
-        let noise = Lanes::splat(1e-10) + Lanes::splat(COLOR_TOLERANCE * COLOR_TOLERANCE) * (here + there);
-        Self { step, square: step[0] * step[0] + step[1] * step[1] + step[2] * step[2], noise }
+        let Guide { mean, variance, .. } = &guides.color;
+        let mut step = [Lanes::ZERO; 3];
+        let mut square = Lanes::ZERO;
+        for (c, step) in step.iter_mut().enumerate() {
+            *step = mean.lanes(c, x + dx, y + dy) - mean.lanes(c, x, y);
+            square += *step * *step;
+        }
+        let both = variance.lanes(0, x, y) + variance.lanes(0, x + dx, y + dy);
+        let noise = Lanes::splat(1e-10) + Lanes::splat(COLOR_TOLERANCE * COLOR_TOLERANCE) * both;
+        Self { step, square, noise }
     }
 }
 
@@ -221,7 +223,7 @@ fn finish(guides: &Guides, tile: Tile, sums: &[[Sums; 3]]) -> Vec<f32> {
     let color = &guides.color;
     let mut out = vec![0.0; 15 * tile.width * tile.height];
     for ((x, y), sums) in blocks(tile).zip(sums) {
-        let load = |planes: &Planes, c| Lanes::load(planes.from(c, (tile.x + x) as isize, (tile.y + y) as isize));
+        let load = |planes: &Planes, c| planes.lanes(c, (tile.x + x) as isize, (tile.y + y) as isize);
         let noise = load(&color.variance, 0);
         for (k, sums) in sums.iter().enumerate() {
             let side = 2 * PATCHES[k.min(1)] + 1;

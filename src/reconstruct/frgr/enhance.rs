@@ -18,14 +18,18 @@ const CODE_SCREEN: f32 = 100.0;
 /// In the printed form only the differences matter; without any pull the equations would have no single solution.
 const PAPER_SCREEN: f32 = 1e-3;
 
-/// A denoised pixel is not believed to have less than this share of its variance as error: its estimate is noisy.
-const LEAST_ERROR: f32 = 0.1;
+/// Least share of its variance that a denoised pixel is believed to have as error: the estimate is noisy, and misses
+/// a bias that is small beside the noise. What gradients alone would reach falls below that as samples are added, and
+/// so does the trust in the denoised image.
+fn least_error(spp: f32) -> f32 {
+    (spp.sqrt() / 80.0).min(1.0)
+}
 
 /// Variance that differences and denoised colours have at least, in squares of the typical luminance.
 const LEAST_VARIANCE: f32 = 1e-6;
 
 /// Residuals are brought down to this share. What is left is well below the noise of the data.
-const TOLERANCE: f64 = 0.02;
+const TOLERANCE: f64 = 0.04;
 
 /// An enhanced image with what is known of its error.
 pub struct Enhanced {
@@ -50,15 +54,13 @@ impl Weight {
 /// Enhances the gradients of a level. `error` is the estimated squared error of the denoised image.
 pub fn enhance(level: &Level, denoised: &Planes, error: &Planes, form: Form, spp: f32) -> Enhanced {
     let (width, height) = (denoised.width, denoised.height);
-    let each = |value: &(dyn Fn(usize, usize) -> f32 + Sync)| -> Vec<f32> {
-        (0..width * height).into_par_iter().map(|i| value(i % width, i / width)).collect()
-    };
-    // Weight of every edge, and what share of the sampled difference remains beside the pull towards zero.
-    let edge = |axis: usize, x: usize, y: usize| weight(level, form, spp, axis, (x as isize, y as isize));
-    let [across, down] = [0, 1].map(|axis| each(&|x, y| edge(axis, x, y).sum()));
-    let screen = each(&|x, y| screen(level, error, form, x as isize, y as isize));
+    let pixels = || (0..width * height).into_par_iter().map(|i| ((i % width) as isize, (i / width) as isize));
+    let edges = |axis: usize| -> Vec<Weight> { pixels().map(|at| weight(level, form, spp, axis, at)).collect() };
+    let edges = [edges(0), edges(1)];
+    let [across, down]: [Vec<f32>; 2] = [0, 1].map(|axis: usize| edges[axis].par_iter().map(Weight::sum).collect());
+    let screen: Vec<f32> = pixels().map(|at| screen(level, error, form, spp, at)).collect();
     let pull = |axis: usize, c: usize, x: usize, y: usize| {
-        edge(axis, x, y).sampled * level.gradients[axis].at(c, x as isize, y as isize)
+        edges[axis][y * width + x].sampled * level.gradients[axis].at(c, x as isize, y as isize)
     };
     let start = |i: usize| {
         let value = |c| denoised.at(c, (i % width) as isize, (i / width) as isize);
@@ -77,7 +79,8 @@ pub fn enhance(level: &Level, denoised: &Planes, error: &Planes, form: Form, spp
     };
     let right: Vec<Quad> = (0..width * height).into_par_iter().map(right).collect();
     let solver = Multigrid::new(Graph::from_grid(width, &across, &down, &screen));
-    let solved = solver.solve(&right, (0..width * height).map(start).collect(), TOLERANCE).x;
+    let start = (0..width * height).into_par_iter().map(start).collect();
+    let solved = solver.solve(&right, start, TOLERANCE).x;
     let image = Planes::from_fn(width, height, 3, |c, x, y| solved[y * width + x][c]);
     let error = (form == Form::Best).then(|| {
         // The inverse of the matrix is the covariance of the errors when all weights are inverse variances. The
@@ -121,13 +124,13 @@ fn weight(level: &Level, form: Form, spp: f32, axis: usize, (x, y): (isize, isiz
     }
 }
 
-fn screen(level: &Level, error: &Planes, form: Form, x: isize, y: isize) -> f32 {
+fn screen(level: &Level, error: &Planes, form: Form, spp: f32, (x, y): (isize, isize)) -> f32 {
     match form {
         Form::Paper => PAPER_SCREEN,
         Form::Code => CODE_SCREEN,
         Form::Best => {
             let variance = (0..3).map(|c| level.variance.at(c, x, y)).sum::<f32>() / 3.0;
-            1.0 / (error.at(0, x, y).max(LEAST_ERROR * variance) + LEAST_VARIANCE)
+            1.0 / (error.at(0, x, y).max(least_error(spp) * variance) + LEAST_VARIANCE)
         }
     }
 }

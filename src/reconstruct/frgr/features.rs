@@ -23,8 +23,8 @@ pub enum Kind {
     Normal,
 }
 
-/// Beyond three pixels the weights of [`Feature::clean`] are under e^-9.
-const RADIUS: isize = 3;
+/// Beyond two pixels the weights of [`Feature::clean`] are e^-9 or less.
+const RADIUS: isize = 2;
 
 /// Squared differences of less than this per channel count as alike.
 const ALIKE: f32 = 1e-3;
@@ -60,14 +60,14 @@ fn clean_tile(mean: &Planes, noise: &Planes, tile: Tile) -> Vec<f32> {
     let blocks = (0..tile.height).flat_map(|y| (0..tile.width).step_by(LANES).map(move |x| (x, y)));
     for (x, y) in blocks {
         let at = ((tile.x + x) as isize, (tile.y + y) as isize);
-        let load = |planes: &Planes, c: usize, dx: isize, dy: isize| Lanes::load(planes.from(c, at.0 + dx, at.1 + dy));
-        let centre = [0, 1, 2].map(|c| load(mean, c, 0, 0));
-        let here = load(noise, 0, 0, 0);
+        let centre: [Lanes; 3] = std::array::from_fn(|c| mean.lanes(c, at.0, at.1));
+        let here = noise.lanes(0, at.0, at.1);
         let tolerance = (here * Lanes::splat(100.0)).max(Lanes::splat(1e-4));
         let (mut total, mut variance, mut sums) = (Lanes::ZERO, Lanes::ZERO, [Lanes::ZERO; 3]);
         for (dx, dy) in (-RADIUS..=RADIUS).flat_map(|dy| (-RADIUS..=RADIUS).map(move |dx| (dx, dy))) {
-            let values = [0, 1, 2].map(|c| load(mean, c, dx, dy));
-            let there = load(noise, 0, dx, dy);
+            let q = (at.0 + dx, at.1 + dy);
+            let values: [Lanes; 3] = std::array::from_fn(|c| mean.lanes(c, q.0, q.1));
+            let there = noise.lanes(0, q.0, q.1);
             let mut beyond = Lanes::ZERO - (here + there);
             for c in 0..3 {
                 beyond += (values[c] - centre[c]) * (values[c] - centre[c]);

@@ -150,7 +150,7 @@ struct Sweeps<'a, const T: usize> {
 impl<'a, const T: usize> Sweeps<'a, T> {
     #[inline(always)]
     fn new(problem: &'a Problem, at: (isize, isize), weights: &'a mut [Lanes]) -> Self {
-        let target = |t: usize, c: usize| Lanes::load(problem.terms[t].target.from(c, at.0, at.1));
+        let target = |t: usize, c: usize| problem.terms[t].target.lanes(c, at.0, at.1);
         let targets = std::array::from_fn(|t| [target(t, 0), target(t, 1), target(t, 2)]);
         let roots = std::array::from_fn(|t| Lanes::splat(problem.terms[t].weight.sqrt()));
         let sums = [[Lanes::ZERO; 3]; T];
@@ -170,8 +170,8 @@ impl<'a, const T: usize> Sweeps<'a, T> {
         for (weight, q) in self.weights.iter().zip(self.problem.window(self.at)) {
             let weight = *weight * share;
             for c in 0..3 {
-                result[c] += weight * Lanes::load(self.problem.color.from(c, q.0, q.1));
-                result[3 + c] += weight * weight * Lanes::load(self.problem.variance.from(c, q.0, q.1));
+                result[c] += weight * self.problem.color.lanes(c, q.0, q.1);
+                result[3 + c] += weight * weight * self.problem.variance.lanes(c, q.0, q.1);
             }
         }
         result
@@ -180,12 +180,12 @@ impl<'a, const T: usize> Sweeps<'a, T> {
     /// Value of term `t` at q less its target.
     #[inline(always)]
     fn difference(&self, t: usize, c: usize, q: (isize, isize)) -> Lanes {
-        Lanes::load(self.problem.terms[t].value.from(c, q.0, q.1)) - self.targets[t][c]
+        self.problem.terms[t].value.lanes(c, q.0, q.1) - self.targets[t][c]
     }
 
     #[inline(always)]
     fn penalty(&self, q: (isize, isize)) -> Lanes {
-        Lanes::load(self.problem.penalty.from(0, q.0, q.1))
+        self.problem.penalty.lanes(0, q.0, q.1)
     }
 
     /// Weights by each pixel's own cost.

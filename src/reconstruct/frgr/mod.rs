@@ -115,17 +115,18 @@ impl Reconstruction for Frgr {
     }
 
     fn reconstruct(&self, frame: &Frame, context: &Context) -> Result<Solution> {
+        (context.progress)("clean", 0.0);
         let inputs = Inputs::new(frame, 1 << (self.levels - 1))?;
         let rows = rows(&inputs, context.memory)?;
         let mut notes = Notes { wanted: context.notes, size: (frame.width, frame.height), notes: Vec::new() };
-        (context.progress)("clean", 0.0);
         let level = self.prepare(&inputs, frame)?;
         notes.add("dx", &level.gradients[0], inputs.scale);
         notes.add("dy", &level.gradients[1], inputs.scale);
+        (context.progress)("denoise", 0.1);
         let denoised = self.denoise(&level, rows, context);
         notes.add("denoised", &denoised.image, inputs.scale);
         let Denoised { image, error } = denoised;
-        (context.progress)("pyramid", 0.5);
+        (context.progress)("pyramid", 0.45);
         let mut levels = vec![Prepared { level, denoised: image, error }];
         let mut choices = Vec::new();
         for k in 1..self.levels {
@@ -136,10 +137,13 @@ impl Reconstruction for Frgr {
         }
         let mut upper: Option<[Planes; 2]> = None;
         for k in (0..self.levels).rev() {
-            (context.progress)("enhance and filter", 1.0 - 0.45 * (k + 1) as f32 / self.levels as f32);
+            // A level has four times the pixels of the one before.
+            let left = 0.4 * 0.25f32.powi(k as i32);
+            (context.progress)("enhance", 1.0 - left - 0.1);
             let this = levels.pop().expect("as many as are counted");
             let enhanced = self.enhance(&this, inputs.spp);
             notes.add(&format!("level{k}_enhanced"), &enhanced.image, inputs.scale);
+            (context.progress)("filter", 1.0 - 0.5 * left);
             let filtered = self.filter(&this, &enhanced.image, upper.as_ref(), inputs.spp);
             notes.add(&format!("level{k}_filtered"), &filtered[0], inputs.scale);
             if k == 0 {
@@ -148,7 +152,7 @@ impl Reconstruction for Frgr {
                 return Ok(Solution { image, error: Some(error), notes: notes.notes });
             }
             let [image, variance] = filtered;
-            upper = Some([choices[k - 1].up(&image), choices[k - 1].up_variance(&variance)]);
+            upper = Some([choices[k - 1].up(&image), choices[k - 1].up_variance(&variance.sum())]);
         }
         unreachable!("there is a level 0")
     }
@@ -188,7 +192,7 @@ impl Frgr {
             smooth_choice: self.form != Form::Paper,
             rows,
         };
-        rdfc::denoise(&guides, options, &|share| (context.progress)("denoise", 0.05 + 0.45 * share))
+        rdfc::denoise(&guides, options, &|share| (context.progress)("denoise", 0.1 + 0.35 * share))
     }
 
     /// The next level, and how to get to it and back.
@@ -233,7 +237,7 @@ impl Frgr {
         Enhanced { image, error: None }
     }
 
-    /// The filtered colour and its variance. `upper` is the result of the coarser level.
+    /// The filtered colour and its variance. `upper` is the result of the coarser level and the sum of its variances.
     fn filter(&self, this: &Prepared, guide: &Planes, upper: Option<&[Planes; 2]>, spp: f32) -> [Planes; 2] {
         let Prepared { level, denoised, .. } = this;
         let weights = self.form.weights(spp);
@@ -260,7 +264,7 @@ impl Frgr {
         if let Some([up, up_variance]) = upper {
             terms.push(Term { value: Cow::Borrowed(up), target: up, weight: weights.upsampled });
             if self.form != Form::Paper {
-                penalty = penalty.zip(&up_variance.sum(), |color, up| color + up);
+                penalty = penalty.zip(up_variance, |color, up| color + up);
             }
         }
         let (color, variance) = (&level.color, &level.variance);

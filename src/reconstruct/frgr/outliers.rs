@@ -17,25 +17,32 @@ const LUMINANCE: [f32; 3] = [0.2126, 0.7152, 0.0722];
 /// this is done only to those that are no more than three of their own standard deviations from the median: what
 /// noise does not explain is in the scene, and noise vanishes as samples are added. Returns three planes of
 /// differences and one of their mean variance.
-pub fn remove(gradient: &Planes, variance: &Planes, [columns, rows]: [usize; 2], noise_test: bool) -> [Planes; 2] {
+pub fn remove(gradient: &Planes, variance: &Planes, edges: [usize; 2], noise_test: bool) -> [Planes; 2] {
     let (width, height) = (gradient.width, gradient.height);
-    let mean = |x: isize, y: isize| (0..3).map(|c| variance.at(c, x, y)).sum::<f32>() / 3.0;
-    let replaced: Vec<Vec<Option<Replacement>>> = (0..height)
-        .into_par_iter()
-        .map(|y| {
-            let inside = |x: usize| x < columns && y < rows;
-            (0..width)
-                .map(|x| if inside(x) { judge(gradient, variance, [columns, rows], [x, y], noise_test) } else { None })
-                .collect()
-        })
-        .collect();
+    let luminance = Planes::from_fn(width, height, 1, |_, x, y| {
+        (0..3).map(|c| LUMINANCE[c] * gradient.at(c, x as isize, y as isize)).sum()
+    });
+    let field = Field { gradient, variance, luminance, edges, noise_test };
+    let row = |y: usize| -> Vec<_> { (0..width).map(|x| field.replacement(x, y)).collect() };
+    let replaced: Vec<Vec<Option<Replacement>>> = (0..height).into_par_iter().map(row).collect();
     let clean = |c: usize, x: usize, y: usize| {
         replaced[y][x].as_ref().map_or_else(|| gradient.at(c, x as isize, y as isize), |new| new.median[c])
     };
+    let mean = |x: isize, y: isize| (0..3).map(|c| variance.at(c, x, y)).sum::<f32>() / 3.0;
     let noise = |_: usize, x: usize, y: usize| {
         replaced[y][x].as_ref().map_or_else(|| mean(x as isize, y as isize), |new| new.spread)
     };
     [Planes::from_fn(width, height, 3, clean), Planes::from_fn(width, height, 1, noise)]
+}
+
+/// Differences along one axis.
+struct Field<'a> {
+    gradient: &'a Planes,
+    variance: &'a Planes,
+    luminance: Planes,
+    /// Columns and rows that hold differences.
+    edges: [usize; 2],
+    noise_test: bool,
 }
 
 /// What an outlier becomes.
@@ -45,42 +52,49 @@ struct Replacement {
     spread: f32,
 }
 
-/// What a difference is to be replaced by, if it is an outlier.
-fn judge(
-    gradient: &Planes,
-    variance: &Planes,
-    [columns, rows]: [usize; 2],
-    [x, y]: [usize; 2],
-    noise_test: bool,
-) -> Option<Replacement> {
-    let xs = x.saturating_sub(RADIUS)..(x + RADIUS + 1).min(columns);
-    let ys = y.saturating_sub(RADIUS)..(y + RADIUS + 1).min(rows);
-    let at = |c: usize, x: usize, y: usize| gradient.at(c, x as isize, y as isize);
-    let luminance = |x: usize, y: usize| (0..3).map(|c| LUMINANCE[c] * at(c, x, y)).sum::<f32>();
-    let (mut values, mut count) = ([0.0f32; (2 * RADIUS + 1) * (2 * RADIUS + 1)], 0);
-    for (i, j) in ys.clone().flat_map(|j| xs.clone().map(move |i| (i, j))).filter(|&at| at != (x, y)) {
-        values[count] = luminance(i, j);
-        count += 1;
+impl Field<'_> {
+    /// What a difference is to be replaced by, if it is an outlier.
+    fn replacement(&self, x: usize, y: usize) -> Option<Replacement> {
+        let [columns, rows] = self.edges;
+        if x >= columns || y >= rows {
+            return None;
+        }
+        let xs = x.saturating_sub(RADIUS)..(x + RADIUS + 1).min(columns);
+        let ys = y.saturating_sub(RADIUS)..(y + RADIUS + 1).min(rows);
+        let (mut values, mut count) = ([0.0f32; (2 * RADIUS + 1) * (2 * RADIUS + 1)], 0);
+        for j in ys.clone() {
+            values[count..count + xs.len()].copy_from_slice(self.luminance.span(
+                0,
+                xs.start as isize,
+                j as isize,
+                xs.len(),
+            ));
+            count += xs.len();
+        }
+        // The difference itself is not one of those around it.
+        values.swap((y - ys.start) * xs.len() + x - xs.start, count - 1);
+        let (around, here) = (&values[..count - 1], values[count - 1]);
+        if around.len() < 3 {
+            return None;
+        }
+        let mean = around.iter().sum::<f32>() / around.len() as f32;
+        let spread =
+            around.iter().map(|value| (value - mean) * (value - mean)).sum::<f32>() / (around.len() - 1) as f32;
+        if here == mean || (here - mean).powi(2) < LIMIT * LIMIT * spread {
+            return None;
+        }
+        let median = [0, 1, 2].map(|c| {
+            let row = |j: usize| self.gradient.span(c, xs.start as isize, j as isize, xs.len());
+            let mut values: Vec<f32> = ys.clone().flat_map(row).copied().collect();
+            let middle = values.len() / 2;
+            *values.select_nth_unstable_by(middle, f32::total_cmp).1
+        });
+        // Fully correlated channels at worst: deviations add up.
+        let deviation = |c: usize| LUMINANCE[c] * self.variance.at(c, x as isize, y as isize).max(0.0).sqrt();
+        let away = here - (0..3).map(|c| LUMINANCE[c] * median[c]).sum::<f32>();
+        let explained = away.abs() <= LIMIT * (0..3).map(deviation).sum::<f32>();
+        (!self.noise_test || explained).then_some(Replacement { median, spread })
     }
-    if count < 3 {
-        return None;
-    }
-    let mean = values[..count].iter().sum::<f32>() / count as f32;
-    let spread = values[..count].iter().map(|value| (value - mean).powi(2)).sum::<f32>() / (count - 1) as f32;
-    let here = luminance(x, y);
-    if here == mean || (here - mean).powi(2) < LIMIT * LIMIT * spread {
-        return None;
-    }
-    let median = [0, 1, 2].map(|c| {
-        let window = ys.clone().flat_map(|j| xs.clone().map(move |i| (i, j)));
-        let mut values: Vec<f32> = window.map(|(i, j)| at(c, i, j)).collect();
-        let middle = values.len() / 2;
-        *values.select_nth_unstable_by(middle, f32::total_cmp).1
-    });
-    // Fully correlated channels at worst: deviations add up.
-    let deviation: f32 = (0..3).map(|c| LUMINANCE[c] * variance.at(c, x as isize, y as isize).max(0.0).sqrt()).sum();
-    let away = here - (0..3).map(|c| LUMINANCE[c] * median[c]).sum::<f32>();
-    (!noise_test || away.abs() <= LIMIT * deviation).then_some(Replacement { median, spread })
 }
 
 #[cfg(test)]

@@ -170,7 +170,7 @@ fn fit_row(guide: &Planes, coarse: &Planes, y: usize) -> Fit {
             target[c] = Lanes(std::array::from_fn(|l| row[2 * l]));
             for k in 0..9 {
                 let (x, y) = around(k, x0, y / 2);
-                near[k][c] = Lanes::load(coarse.from(c, x, y));
+                near[k][c] = coarse.lanes(c, x, y);
                 away[k] += (target[c] - near[k][c]) * (target[c] - near[k][c]);
             }
         }
