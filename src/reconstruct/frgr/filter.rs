@@ -160,7 +160,6 @@ impl<'a, const T: usize> Sweeps<'a, T> {
     #[inline(always)]
     fn run(mut self) -> [Lanes; 6] {
         self.start();
-        self.settle();
         for _ in 0..SWEEPS {
             self.sweep();
         }
@@ -188,31 +187,31 @@ impl<'a, const T: usize> Sweeps<'a, T> {
         self.problem.penalty.lanes(0, q.0, q.1)
     }
 
-    /// Weights by each pixel's own cost.
+    /// Weights by each pixel's own cost, and their sums.
     #[inline(always)]
     fn start(&mut self) {
+        let mut total = Lanes::ZERO;
         for (k, q) in self.problem.window(self.at).enumerate() {
-            let mut cost = self.penalty(q) + Lanes::splat(0.1);
+            let penalty = self.penalty(q);
+            let mut cost = penalty + Lanes::splat(0.1);
+            let mut differences = [[Lanes::ZERO; 3]; T];
             for (t, c) in (0..T).flat_map(|t| [(t, 0), (t, 1), (t, 2)]) {
                 let difference = self.difference(t, c, q);
                 cost += difference * difference;
+                differences[t][c] = difference;
             }
-            self.weights[k] = Lanes::splat(1.0) / cost.sqrt();
-        }
-    }
-
-    /// Makes the weights sum to one and computes the sums.
-    #[inline(always)]
-    fn settle(&mut self) {
-        let total = self.weights.iter().fold(Lanes::ZERO, |sum, weight| sum + *weight);
-        let share = Lanes::splat(1.0) / total;
-        for (k, q) in self.problem.window(self.at).enumerate() {
-            let weight = self.weights[k] * share;
+            let weight = Lanes::splat(1.0) / cost.sqrt();
             self.weights[k] = weight;
-            self.cost += weight * weight * self.penalty(q);
+            total += weight;
+            self.cost += weight * weight * penalty;
             for (t, c) in (0..T).flat_map(|t| [(t, 0), (t, 1), (t, 2)]) {
-                self.sums[t][c] += weight * self.roots[t] * self.difference(t, c, q);
+                self.sums[t][c] += weight * differences[t][c];
             }
+        }
+        self.scale = Lanes::splat(1.0) / total;
+        self.cost = self.cost * self.scale * self.scale;
+        for (t, c) in (0..T).flat_map(|t| [(t, 0), (t, 1), (t, 2)]) {
+            self.sums[t][c] = self.sums[t][c] * self.roots[t] * self.scale;
         }
     }
 
