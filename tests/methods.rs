@@ -151,6 +151,40 @@ fn the_bound_on_memory_changes_no_bit_or_is_refused() {
 }
 
 #[test]
+fn finite_layers_make_finite_images() {
+    // Every magnitude next to every other, black pixels, negative ones, and variances that do not fit the values.
+    let extreme = |seed: u64, i: usize| {
+        let random = |k: u64| rng::unit(rng::combine(rng::combine(seed, k), i as u64));
+        match (random(1) * 6.0) as u32 {
+            0 => 0.0,
+            1 => 1e-18 * random(2),
+            2 => 1e9 * random(2),
+            3 => -random(2),
+            _ => 10f32.powf(12.0 * random(2) - 6.0),
+        }
+    };
+    for method in METHODS {
+        for seed in 0..6 {
+            let mut frame = exact(&picture(37, 29));
+            for (k, layer) in Layer::all().enumerate() {
+                let mut image = frame.get(layer).unwrap().clone();
+                let variance = layer.name().ends_with("variance");
+                let kept = seed == 0 || matches!(layer, Layer::Samples | Layer::Rejected);
+                for (i, value) in image.data.iter_mut().enumerate().filter(|_| !kept) {
+                    let new = extreme(100 * seed + k as u64, i);
+                    *value = if variance { new.abs() } else { new };
+                }
+                frame.set(layer, image);
+            }
+            let solution = solve(parse(method.id).unwrap().as_ref(), &frame, &QUIET).unwrap();
+            let error = solution.error.unwrap_or_default();
+            let all = solution.image.data.iter().chain(&error.data);
+            assert!(all.into_iter().all(|value| value.is_finite()), "{}, seed {seed}", method.id);
+        }
+    }
+}
+
+#[test]
 fn notes_are_made_on_request_only() {
     for method in METHODS {
         let made = parse(method.id).unwrap();
