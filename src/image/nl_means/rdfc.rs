@@ -18,8 +18,9 @@ pub struct Options {
     pub window: usize,
     /// Whether opposite pixels whose mean fits better than they do are weighted by how well it does.
     pub symmetric: bool,
-    /// Whether estimated errors and the choice between the filters are smoothed.
-    pub smooth_choice: bool,
+    /// Radius of the window that the choice between the filters is smoothed over; zero to take it pixel by pixel, from
+    /// errors that are not smoothed either.
+    pub choice: usize,
     /// Most rows to work on at a time; the result does not depend on it.
     pub rows: usize,
 }
@@ -60,18 +61,19 @@ fn denoise_band(guides: &Guides, options: Options) -> Denoised {
     let (width, height) = (guides.color.mean.width, guides.color.mean.height);
     let candidates = Planes::from_tiles(width, height, 3 * 5, |tile| denoise_tile(guides, tile, options));
     let errors = candidates.part(9, 3);
-    let smooth = Settings { window: 1, patch: 3, color: 1.0, feature: None };
-    let errors = if options.smooth_choice { filter(&errors, guides, smooth) } else { errors };
+    let smooth = options.choice > 0;
+    let of_errors = Settings { window: 1, patch: 3, color: 1.0, feature: None };
+    let errors = if smooth { filter(&errors, guides, of_errors) } else { errors };
     let best = |x: isize, y: isize| {
         let slope = |k: usize| candidates.at(12 + k, x, y);
-        let first = usize::from(options.smooth_choice && slope(0) >= slope(1));
+        let first = usize::from(smooth && slope(0) >= slope(1));
         (first..3).min_by(|&a, &b| errors.at(a, x, y).total_cmp(&errors.at(b, x, y))).unwrap_or(2)
     };
     let mut choice =
         Planes::from_fn(width, height, 3, |k, x, y| f32::from(u8::from(best(x as isize, y as isize) == k)));
-    if options.smooth_choice {
-        let smooth = Settings { window: 3, patch: 1, color: 0.5, feature: Some(FEATURE_TOLERANCE) };
-        choice = filter(&choice, guides, smooth);
+    if smooth {
+        let of_choice = Settings { window: options.choice, patch: 1, color: 0.5, feature: Some(FEATURE_TOLERANCE) };
+        choice = filter(&choice, guides, of_choice);
     }
     let blend = |from: &Planes, first: usize, step: usize, x: usize, y: usize| {
         let (x, y) = (x as isize, y as isize);

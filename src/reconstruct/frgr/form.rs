@@ -43,6 +43,15 @@ impl Form {
         if self == Self::Best { 5 } else { 10 }
     }
 
+    /// Radius of the window that the choice between the first denoising's filters is smoothed over.
+    pub fn choice(self) -> usize {
+        match self {
+            Self::Paper => 0,
+            Self::Code => 3,
+            Self::Best => 2,
+        }
+    }
+
     /// Weights for a number of samples per pixel (Yan et al. 2024, section 3.3.5).
     pub fn weights(self, spp: f32) -> Weights {
         let root = 1.0 / spp.sqrt();
