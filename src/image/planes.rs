@@ -136,7 +136,7 @@ impl Planes {
         &self.planes[c][at..at + length]
     }
 
-    /// Values from a pixel on, at least [`SLACK`] of them; the row is followed by the border and the next row.
+    /// Values from a pixel on, at least a hundred of them; the row is followed by the border and the next row.
     #[inline(always)]
     pub fn from(&self, c: usize, x: isize, y: isize) -> &[f32] {
         &self.planes[c][self.index(x, y)..]
