@@ -38,6 +38,12 @@ pub struct Tile {
 }
 
 impl Tile {
+    /// Columns and rows, within the tile, where blocks of [`LANES`] pixels begin, row by row.
+    #[inline(always)]
+    pub fn blocks(self) -> impl Iterator<Item = (usize, usize)> {
+        (0..self.height).flat_map(move |y| (0..self.width).step_by(LANES).map(move |x| (x, y)))
+    }
+
     /// Puts values from column `x` of row `y` on into channel `c` of a tile, as [`Planes::from_tiles`] takes it;
     /// what is beyond the last column is left out.
     #[inline(always)]

@@ -68,10 +68,9 @@ fn filter_tile(values: &Planes, guides: &Guides, settings: Settings, tile: Tile)
     let mut patches = Patches::new(tile, settings.patch, 1);
     // Total weight, largest weight, and the sums of each channel.
     let mut sums = vec![Lanes::ZERO; (2 + channels) * tile.height * width / LANES];
-    let blocks = || (0..tile.height).flat_map(|y| (0..width).step_by(LANES).map(move |x| (x, y)));
     for (dx, dy) in offsets(settings.window) {
         patches.compare(&guides.color, Other::At(dx, dy), settings.color * settings.color, &[settings.patch]);
-        for ((x, y), sums) in blocks().zip(sums.chunks_exact_mut(2 + channels)) {
+        for ((x, y), sums) in tile.blocks().zip(sums.chunks_exact_mut(2 + channels)) {
             let (px, py) = ((tile.x + x) as isize, (tile.y + y) as isize);
             let mut distance = patches.mean(0, settings.patch, x, y).max(Lanes::ZERO);
             if let Some(k) = settings.feature {
@@ -86,7 +85,7 @@ fn filter_tile(values: &Planes, guides: &Guides, settings: Settings, tile: Tile)
         }
     }
     let mut out = vec![0.0; channels * tile.width * tile.height];
-    for ((x, y), sums) in blocks().zip(sums.chunks_exact(2 + channels)) {
+    for ((x, y), sums) in tile.blocks().zip(sums.chunks_exact(2 + channels)) {
         // The centre is like itself, but no more so than the best of the others: its noise is its own.
         let centre = sums[1].max(Lanes::splat(1e-3));
         for c in 0..channels {

@@ -163,19 +163,13 @@ fn denoise_tile(guides: &Guides, tile: Tile, options: Options) -> Vec<f32> {
     finish(guides, tile, &sums)
 }
 
-/// Blocks of a tile.
-#[inline(always)]
-fn blocks(tile: Tile) -> impl Iterator<Item = (usize, usize)> {
-    (0..tile.height).flat_map(move |y| (0..tile.width).step_by(LANES).map(move |x| (x, y)))
-}
-
 #[inline(always)]
 fn add_pixels(guides: &Guides, tile: Tile, window: usize, sums: &mut [[Sums; 3]]) {
     let mut patches = Patches::new(tile, PATCHES[1], 2);
     for (dx, dy) in offsets(window) {
         let other = Other::At(dx, dy);
         patches.compare(&guides.color, other, COLOR_TOLERANCE * COLOR_TOLERANCE, &PATCHES);
-        for ((x, y), sums) in blocks(tile).zip(&mut *sums) {
+        for ((x, y), sums) in tile.blocks().zip(&mut *sums) {
             let at = ((tile.x + x) as isize, (tile.y + y) as isize);
             let pixel = Neighbour::new(guides, at, (dx, dy));
             let apart = guides.apart(at, other, FEATURE_TOLERANCE * FEATURE_TOLERANCE);
@@ -199,7 +193,7 @@ fn add_pairs(guides: &Guides, tile: Tile, window: usize, sums: &mut [[Sums; 3]])
         for (patches, other) in patches.iter_mut().zip(others) {
             patches.compare(&guides.color, other, COLOR_TOLERANCE * COLOR_TOLERANCE, &PATCHES);
         }
-        for ((x, y), sums) in blocks(tile).zip(&mut *sums) {
+        for ((x, y), sums) in tile.blocks().zip(&mut *sums) {
             let at = ((tile.x + x) as isize, (tile.y + y) as isize);
             let pixels = [Neighbour::new(guides, at, (dx, dy)), Neighbour::new(guides, at, (-dx, -dy))];
             let apart = others.map(|other| guides.apart(at, other, FEATURE_TOLERANCE * FEATURE_TOLERANCE));
@@ -224,7 +218,7 @@ fn add_pairs(guides: &Guides, tile: Tile, window: usize, sums: &mut [[Sums; 3]])
 fn finish(guides: &Guides, tile: Tile, sums: &[[Sums; 3]]) -> Vec<f32> {
     let color = &guides.color;
     let mut out = vec![0.0; 15 * tile.width * tile.height];
-    for ((x, y), sums) in blocks(tile).zip(sums) {
+    for ((x, y), sums) in tile.blocks().zip(sums) {
         let load = |planes: &Planes, c| planes.lanes(c, (tile.x + x) as isize, (tile.y + y) as isize);
         let noise = load(&color.variance, 0);
         for (k, sums) in sums.iter().enumerate() {

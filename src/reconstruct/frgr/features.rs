@@ -2,7 +2,7 @@
 
 use crate::image::nl_means::Guide;
 use crate::image::planes::{Planes, Tile};
-use crate::math::lanes::{LANES, Lanes};
+use crate::math::lanes::Lanes;
 
 /// A feature of three channels.
 pub struct Feature {
@@ -57,8 +57,7 @@ impl Feature {
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
 fn clean_tile(mean: &Planes, noise: &Planes, tile: Tile) -> Vec<f32> {
     let mut out = vec![0.0; 4 * tile.width * tile.height];
-    let blocks = (0..tile.height).flat_map(|y| (0..tile.width).step_by(LANES).map(move |x| (x, y)));
-    for (x, y) in blocks {
+    for (x, y) in tile.blocks() {
         let at = ((tile.x + x) as isize, (tile.y + y) as isize);
         let centre: [Lanes; 3] = std::array::from_fn(|c| mean.lanes(c, at.0, at.1));
         let here = noise.lanes(0, at.0, at.1);

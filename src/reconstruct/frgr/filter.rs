@@ -8,7 +8,7 @@
 use std::borrow::Cow;
 
 use crate::image::planes::{Planes, Tile};
-use crate::math::lanes::{LANES, Lanes};
+use crate::math::lanes::Lanes;
 use crate::solve::simplex::{RANK, nearest};
 
 /// Sweeps of the iterative solver.
@@ -117,7 +117,7 @@ fn exact_tile(problem: &Problem, tile: Tile) -> Vec<f32> {
 fn sweep_tile(problem: &Problem, tile: Tile) -> Vec<f32> {
     let mut out = vec![0.0; 6 * tile.width * tile.height];
     let mut weights = vec![Lanes::ZERO; (2 * problem.radius + 1).pow(2)];
-    for (x, y) in (0..tile.height).flat_map(|y| (0..tile.width).step_by(LANES).map(move |x| (x, y))) {
+    for (x, y) in tile.blocks() {
         let at = ((tile.x + x) as isize, (tile.y + y) as isize);
         // The number of terms is known to the compiler, so that their sums stay in registers.
         let planes = match problem.terms.len() {
