@@ -2,6 +2,8 @@
 
 # What the build links against, and what the tests and CI call. apt-get names, the same on both releases.
 PACKAGES = g++ pkg-config libclang-dev libembree-dev libopenimageio-dev
+# A test opens the report in it.
+TEST_PACKAGES = chromium
 SCENE = scenes/cornell-box/scene.xml
 
 .PHONY: demo test packages check
@@ -14,6 +16,7 @@ demo: packages
 	@echo "look at demo/cornell-box.png; demo/cornell-box.exr holds the radiance"
 
 test: packages
+	@sh .ci/packages $(TEST_PACKAGES)
 	cargo test --release
 	cargo build --release
 	target/release/fluxion validate

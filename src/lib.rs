@@ -24,4 +24,8 @@ pub mod render;
 
 pub mod metrics;
 pub mod reconstruct;
+pub mod reference;
 pub mod validate;
+
+pub mod bench;
+pub mod report;

@@ -16,12 +16,16 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("render", &["scene", "film", "plan", "image", "math"]),
     ("reconstruct", &["film", "image", "solve", "math"]),
     ("metrics", &["image", "math"]),
-    ("validate", &["scene", "film", "render", "image", "metrics"]),
+    ("reference", &["scene", "film", "render", "image", "math"]),
+    ("validate", &["scene", "reference", "image"]),
+    ("bench", &["scene", "plan", "film", "render", "image", "math", "reconstruct", "reference", "metrics"]),
+    ("report", &["bench", "image", "math", "metrics"]),
 ];
 
 /// Files that may use `ffi`; everything else goes through them.
 const FFI_USERS: &[&str] = &[
     "src/image/io.rs",
+    "src/image/oidn.rs",
     "src/scene/accel.rs",
     "src/scene/shape/mod.rs",
     "src/scene/shape/mesh.rs",

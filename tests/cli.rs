@@ -85,6 +85,13 @@ fn figures_come_as_json_with_the_promised_keys() {
         assert_eq!(figures[key].as_f64(), Some(value), "{key}");
     }
     assert!(folder.path().join("map.png").is_file());
+    let arguments = ["compare", "a.exr", "a.exr", "a.exr", "--json", "all.json", "--html", "page.html"];
+    fluxion(folder.path()).args(arguments).assert().success();
+    let all = std::fs::read_to_string(folder.path().join("all.json")).unwrap();
+    let all: serde_json::Value = serde_json::from_str(&all).unwrap();
+    assert_eq!((all.as_array().unwrap().len(), all[1]["image"].as_str()), (2, Some("a.exr")));
+    let page = std::fs::read_to_string(folder.path().join("page.html")).unwrap();
+    assert!(page.contains("data:image/png;base64,") && !page.contains("{{"));
 }
 
 #[test]

@@ -1,16 +1,21 @@
 //! The command line: one file per command.
 
+mod bench;
 mod compare;
 mod info;
 mod method;
 mod outputs;
 mod progress;
 mod reconstruct;
+mod reference;
 mod render;
 mod stats;
 mod validate;
 
 use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
 use anyhow::Result;
 use clap::{Parser, Subcommand};
@@ -29,8 +34,12 @@ enum Command {
     Render(render::Args),
     /// Reconstruct an image from saved layers
     Reconstruct(reconstruct::Args),
-    /// Measure an image against a reference
+    /// Measure images against a reference
     Compare(compare::Args),
+    /// Measure error against run time: scenes, methods, budgets, seeds
+    Bench(bench::Args),
+    /// Render the reference image of a scene, in waves that can be gone on with
+    Reference(reference::Args),
     /// Show what a scene holds and needs, or what Fluxion knows
     Info(info::Args),
     /// Render bundled scenes and check them against their references
@@ -43,6 +52,8 @@ pub fn run(args: Args) -> Result<ExitCode> {
         Command::Render(args) => render::run(&args),
         Command::Reconstruct(args) => reconstruct::run(&args),
         Command::Compare(args) => compare::run(&args),
+        Command::Bench(args) => bench::run(&args),
+        Command::Reference(args) => reference::run(&args),
         Command::Info(args) => info::run(&args),
         Command::Validate(args) => validate::run(&args),
     }
@@ -58,10 +69,34 @@ fn parse_size(text: &str) -> Result<(usize, usize), String> {
     ))
 }
 
+/// Seconds, or a number with the unit s, m or h.
+fn parse_time(text: &str) -> Result<Duration, String> {
+    let units = [("s", 1.0), ("m", 60.0), ("h", 3600.0)];
+    let split = units.iter().find_map(|(unit, seconds)| Some((text.strip_suffix(unit)?, *seconds)));
+    let (number, unit) = split.unwrap_or((text, 1.0));
+    let seconds = number.parse::<f64>().ok().filter(|&t| t > 0.0).map(|t| t * unit);
+    let duration = seconds.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
+    duration.ok_or_else(|| format!("`{text}` is not a positive time, as in 60, 1.5s, 30m or 2h"))
+}
+
 /// `NAME=VALUE`.
 fn parse_definition(text: &str) -> Result<(String, String), String> {
     let (name, value) = text.split_once('=').ok_or("a definition is written NAME=VALUE")?;
     Ok((name.to_owned(), value.to_owned()))
+}
+
+/// A flag that the first interrupt sets; the second ends the program.
+fn stop_on_interrupt() -> Result<Arc<AtomicBool>> {
+    let stop = Arc::new(AtomicBool::new(false));
+    let handler = Arc::clone(&stop);
+    ctrlc::set_handler(move || {
+        // The second time it is meant.
+        if handler.swap(true, Ordering::Relaxed) {
+            std::process::exit(130);
+        }
+        eprintln!("\nstopping after the running tiles; once more ends at once");
+    })?;
+    Ok(stop)
 }
 
 /// Makes all parallel work use this many threads (0: one per core).

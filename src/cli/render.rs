@@ -2,14 +2,12 @@
 
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use anyhow::{Result, bail};
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use fluxion::error::Error;
-use fluxion::film::{Frame, Layer, Needs, exr};
+use fluxion::film::{Needs, exr};
 use fluxion::plan::Plan;
 use fluxion::render::gradient::Tracer;
 use fluxion::render::gradient::shift::{SHIFTS, Shift};
@@ -31,8 +29,8 @@ pub struct Args {
     /// Samples per pixel [default: the scene's own]
     #[arg(long, conflicts_with = "time", value_parser = clap::value_parser!(u32).range(1..))]
     spp: Option<u32>,
-    /// Seconds to render for, as in 60 or 60s
-    #[arg(long, value_parser = parse_seconds, value_name = "SECONDS")]
+    /// Time to render for, as in 60, 60s or 5m
+    #[arg(long, value_parser = super::parse_time, value_name = "TIME")]
     time: Option<Duration>,
     /// Seed of the random numbers; the same seed gives the same bits on any number of threads
     #[arg(long, default_value_t = 0)]
@@ -72,12 +70,6 @@ pub struct Args {
     /// Show no progress
     #[arg(short, long)]
     quiet: bool,
-}
-
-fn parse_seconds(text: &str) -> Result<Duration, String> {
-    let number = text.strip_suffix('s').unwrap_or(text).parse::<f64>().ok().filter(|&t| t > 0.0);
-    let duration = number.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
-    duration.ok_or_else(|| "a time is a positive number of seconds, as in 60 or 1.5s".into())
 }
 
 fn parse_sample(text: &str) -> Result<(usize, usize, u32), String> {
@@ -123,7 +115,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let start = Instant::now();
     let mut frame = outcome.film.develop();
     if method.needs().edges && !plan.needs.edges {
-        fill_dark_edges(&mut frame);
+        frame.fill_dark_edges();
     }
     frame.attributes = attributes(args, &scene, &stats);
     stats.seconds.develop = start.elapsed().as_secs_f64();
@@ -154,20 +146,12 @@ fn shift(args: &Args) -> Shift {
 }
 
 fn trace(args: &Args, scene: &Scene, needs: Needs) -> Result<Outcome> {
-    let stop = Arc::new(AtomicBool::new(false));
-    let handler = Arc::clone(&stop);
-    ctrlc::set_handler(move || {
-        // The second time it is meant.
-        if handler.swap(true, Ordering::Relaxed) {
-            std::process::exit(130);
-        }
-        eprintln!("\nstopping after the running tiles; once more ends at once");
-    })?;
+    let stop = super::stop_on_interrupt()?;
     let budget = match args.time {
         Some(time) => Budget::Time(time),
         None => Budget::Spp(args.spp.unwrap_or(scene.sensor().spp)),
     };
-    let settings = Settings { budget, seed: args.seed, needs, shift: shift(args) };
+    let settings = Settings { budget, seed: args.seed, first: 0, needs, shift: shift(args) };
     let bar = progress::bar(args.quiet);
     bar.set_message("rendering");
     let report = |share| progress::set(&bar, share);
@@ -192,14 +176,6 @@ fn warn(args: &Args, outcome: &Outcome) {
             args.scene.display(),
             args.shift
         );
-    }
-}
-
-/// In a scene without scattered light all differences are known to be zero.
-fn fill_dark_edges(frame: &mut Frame) {
-    let black = fluxion::image::Image::new(frame.width, frame.height, 3);
-    for layer in [Layer::Dx, Layer::DxVariance, Layer::Dy, Layer::DyVariance] {
-        frame.set(layer, black.clone());
     }
 }
 

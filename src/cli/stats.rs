@@ -42,15 +42,8 @@ pub struct Stats {
 impl Stats {
     /// Writes the object, with the peak memory as it is now.
     pub fn save(&mut self, path: &Path) -> Result<()> {
-        self.peak_bytes = peak_bytes();
+        self.peak_bytes = fluxion::bench::peak_bytes();
         let text = serde_json::to_string_pretty(self)?;
         std::fs::write(path, text + "\n").with_context(|| format!("cannot write {}", path.display()))
     }
-}
-
-/// Largest resident set so far, 0 where the system does not say.
-fn peak_bytes() -> u64 {
-    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
-    line.and_then(|rest| rest.trim().trim_end_matches("kB").trim().parse::<u64>().ok()).unwrap_or(0) * 1024
 }

@@ -21,12 +21,6 @@ pub struct Args {
     /// Threads to work with (0: one per core)
     #[arg(long, default_value_t = 0)]
     threads: usize,
-    /// Make the references anew instead, with this many samples per pixel
-    #[arg(long, value_name = "SPP", value_parser = clap::value_parser!(u32).range(2..))]
-    remake: Option<u32>,
-    /// Film size of a reference that is made anew [default: the scene's own]
-    #[arg(long, value_parser = super::parse_size, requires = "remake", value_name = "WxH")]
-    size: Option<(usize, usize)>,
 }
 
 /// Checks every scene and prints a table.
@@ -35,13 +29,6 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let folders = if args.scenes.is_empty() { below(Path::new("scenes"))? } else { args.scenes.clone() };
     if folders.is_empty() {
         bail!(Error::Usage("there is no folder with a scene.xml below scenes/; name one".into()));
-    }
-    if let Some(spp) = args.remake {
-        for folder in &folders {
-            let floor = validate::remake(folder, spp, args.size)?;
-            println!("{:<28} {spp} spp, relMSE floor {floor:.1e}", folder.display());
-        }
-        return Ok(ExitCode::SUCCESS);
     }
     println!("{:<28} {:>9} {:>9} {:>9} {:>7} {:>9}", "scene", "mean R", "mean G", "mean B", "z rms", "|z| > 4");
     let mut failed = 0;

@@ -1,6 +1,8 @@
 //! Safe wrappers around the C libraries: the only unsafe code of the crate.
 
 pub mod embree;
+#[cfg(feature = "oidn")]
+pub mod oidn;
 pub mod oiio;
 
 /// The declarations that bindgen makes from the headers under `ffi/`.

@@ -2,6 +2,8 @@
 
 pub mod io;
 pub mod nl_means;
+#[cfg(feature = "oidn")]
+pub mod oidn;
 pub mod planes;
 
 use crate::math::{Rgb, vec3};

@@ -81,17 +81,20 @@ impl Lanes {
         Self(out)
     }
 
-    /// e^x for x <= 0, to a relative 1e-6; less than 1e-36 where x is below -85.
+    /// e^x for x <= 0, to a relative 1e-6; zero where x is below -40, so that products of weights do not become
+    /// denormal numbers, which take a hundred times as long.
     #[inline(always)]
     pub fn exp_negative(self) -> Self {
         // Adding 1.5 * 2^23 leaves the nearest integer in the low bits.
         const ROUND: f32 = 12_582_912.0;
-        let x = self.max(Self::splat(-85.0)) * Self::splat(std::f32::consts::LOG2_E);
+        const LEAST: Lanes = Lanes([-40.0; LANES]);
+        let x = self.max(LEAST) * Self::splat(std::f32::consts::LOG2_E);
         let shifted = x + Self::splat(ROUND);
         let f = (x - (shifted - Self::splat(ROUND))) * Self::splat(std::f32::consts::LN_2);
         let power = shifted.map(|shifted| f32::from_bits((shifted.to_bits() << 23).wrapping_add(127 << 23)));
         let terms = [0.001_393, 0.008_375_2, 0.041_665_82, 0.166_666_57, 0.5, 1.0, 1.0];
-        power * terms.into_iter().fold(Self::ZERO, |sum, term| sum * f + Self::splat(term))
+        let value = power * terms.into_iter().fold(Self::ZERO, |sum, term| sum * f + Self::splat(term));
+        value.where_greater(self, LEAST, Self::ZERO)
     }
 }
 
@@ -126,12 +129,12 @@ mod tests {
     #[test]
     fn the_exponential_is_one() {
         for i in 0..100_000 {
-            let x = -85.0 * i as f32 / 100_000.0;
+            let x = -39.9 * i as f32 / 100_000.0;
             let (ours, exact) = (f64::from(Lanes::splat(x).exp_negative().0[3]), f64::from(x).exp());
             assert!((ours / exact - 1.0).abs() < 1e-6 + 1e-7 * f64::from(-x), "{x}: {ours} instead of {exact}");
         }
         assert_eq!(Lanes::ZERO.exp_negative(), Lanes::splat(1.0));
-        assert!(Lanes::splat(-1e30).exp_negative().0[0] < 1e-36);
+        assert_eq!(Lanes::splat(-1e30).exp_negative(), Lanes::ZERO);
     }
 
     #[test]

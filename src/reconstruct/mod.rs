@@ -1,9 +1,19 @@
 //! Reconstructions: methods that make an image of a frame.
 
+mod control_variate;
+mod features;
 mod frgr;
+mod inputs;
+mod l1;
 mod l2;
+mod least_trimmed;
+mod nfor;
+mod nlm;
+#[cfg(feature = "oidn")]
+mod oidn;
 mod parameters;
 mod primal;
+mod rdfc;
 
 pub use self::parameters::Parameters;
 use crate::error::{Error, Result};
@@ -73,7 +83,19 @@ pub struct Method {
 }
 
 /// Every method.
-pub const METHODS: &[Method] = &[primal::METHOD, l2::METHOD, frgr::METHOD];
+pub const METHODS: &[Method] = &[
+    primal::METHOD,
+    l2::METHOD,
+    l1::METHOD,
+    control_variate::METHOD,
+    least_trimmed::METHOD,
+    nlm::METHOD,
+    rdfc::METHOD,
+    nfor::METHOD,
+    frgr::METHOD,
+    #[cfg(feature = "oidn")]
+    oidn::METHOD,
+];
 
 /// The method that `render` uses when none is given.
 pub const DEFAULT: &str = "frgr";

@@ -36,4 +36,14 @@ impl Parameters {
             Error::Usage(format!("parameter `{name}` of method `{}` is `{text}`; it must be {range}", self.method))
         })
     }
+
+    /// A value that is `on` or `off`.
+    pub fn switch(&self, name: &str) -> Result<bool> {
+        Ok(self.choice(name, &["on", "off"])? == "on")
+    }
+
+    /// A value out of a few.
+    pub fn choice(&self, name: &str, choices: &[&str]) -> Result<String> {
+        self.get(name, &choices.join(" or "), |text: &String| choices.contains(&text.as_str()))
+    }
 }

@@ -28,6 +28,9 @@ pub struct Settings {
     pub budget: Budget,
     /// Different seeds give independent images.
     pub seed: u64,
+    /// Number of the first sample of every pixel: renders that go on where others end take samples together that are
+    /// spread better than independent ones.
+    pub first: u32,
     /// What to record; edges make it gradient-domain path tracing.
     pub needs: Needs,
     /// How differences to neighbours are sampled.
@@ -128,7 +131,7 @@ fn run_tile(scene: &Scene, settings: Settings, tile: &mut Tile, wave: u32) -> Op
     for _ in 0..wave {
         for pixel in 0..tile.width * tile.height {
             let (x, y) = (tile.x + pixel % tile.width, tile.y + pixel / tile.width);
-            let id = SampleId { seed: settings.seed, x, y, index: tile.count(pixel) };
+            let id = SampleId { seed: settings.seed, x, y, index: settings.first + tile.count(pixel) };
             if let Err(reason) = tile.add(pixel, &sample(scene, id, tracer.as_mut())) {
                 first_rejected.get_or_insert((id, reason));
             }

@@ -2,6 +2,7 @@
 
 pub mod dct;
 pub mod graph;
+pub mod irls;
 pub mod multigrid;
 pub mod poisson;
 pub mod simplex;

@@ -1,10 +1,12 @@
-//! The screened Poisson equation with constant coefficients.
+//! The screened Poisson equation, with constant coefficients and with a weight for every edge and pixel.
 
 use std::f64::consts::PI;
 
 use rayon::prelude::*;
 
 use super::dct::Dct2;
+use super::graph::{Graph, Quad};
+use super::multigrid::Multigrid;
 
 /// Solves min |α (u - data)|² + |Dx u - dx|² + |Dy u - dy|² exactly. Images are rows of `width`; the last column
 /// of `dx` and the last row of `dy` are no edges and are not read. Needs α > 0.
@@ -32,6 +34,53 @@ pub fn screened(width: usize, data: &[f64], dx: &[f64], dy: &[f64], alpha: f64) 
     });
     dct.inverse(&mut right);
     right
+}
+
+/// Weights of a problem: min Σ screen |u - data|² + Σ across |Dx u - dx|² + Σ down |Dy u - dy|².
+pub struct Weights {
+    /// Of the differences to the right.
+    pub across: Vec<f32>,
+    /// Of the differences downwards.
+    pub down: Vec<f32>,
+    /// Of the data.
+    pub screen: Vec<f32>,
+}
+
+/// What [`Weights`] weigh: rows of `width` pixels of up to four channels.
+#[derive(Clone, Copy)]
+pub struct Data<'a> {
+    /// Pixels in a row.
+    pub width: usize,
+    /// The image.
+    pub data: &'a [Quad],
+    /// Its differences to the right and downwards; the last column and row, which are no edges, are not read.
+    pub edges: [&'a [Quad]; 2],
+}
+
+impl Weights {
+    /// Right-hand side of the normal equations.
+    pub fn right(&self, Data { width, data, edges: [dx, dy] }: Data) -> Vec<Quad> {
+        let nodes = data.len();
+        let value = |i: usize| {
+            let mut sum = data[i].map(|value| self.screen[i] * value);
+            let mut add = |there: bool, weights: &[f32], edges: &[Quad], at: usize, sign: f32| {
+                if there {
+                    (0..4).for_each(|c| sum[c] += sign * weights[at] * edges[at][c]);
+                }
+            };
+            add(!i.is_multiple_of(width), &self.across, dx, i.wrapping_sub(1), 1.0);
+            add(!(i + 1).is_multiple_of(width), &self.across, dx, i, -1.0);
+            add(i >= width, &self.down, dy, i.wrapping_sub(width), 1.0);
+            add(i + width < nodes, &self.down, dy, i, -1.0);
+            sum
+        };
+        (0..nodes).into_par_iter().map(value).collect()
+    }
+
+    /// The solver of the normal equations.
+    pub fn solver(&self, width: usize) -> Multigrid {
+        Multigrid::new(Graph::from_grid(width, &self.across, &self.down, &self.screen))
+    }
 }
 
 #[cfg(test)]

@@ -53,6 +53,6 @@ pub fn film(scene: &Scene, spp: u32, seed: u64, needs: Needs) -> Film {
 
 /// The same with a shift of our choice.
 pub fn shifted_film(scene: &Scene, spp: u32, seed: u64, needs: Needs, shift: Shift) -> Film {
-    let settings = Settings { budget: Budget::Spp(spp), seed, needs, shift };
+    let settings = Settings { budget: Budget::Spp(spp), seed, first: 0, needs, shift };
     render(scene, settings, &Control { stop: &AtomicBool::new(false), progress: &|_| {} }).film
 }

@@ -55,6 +55,34 @@ pub fn filter(values: &Planes, guides: &Guides, settings: Settings) -> Planes {
     })
 }
 
+/// Weights of a tile's pixels for those of their windows, centres included, by colour alone. For each of the tile's
+/// blocks the offsets follow each other, row by row, with a weight for every pixel. Those outside the image have none.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
+pub fn weights(guide: &Guide, settings: Settings, tile: Tile) -> Vec<f32> {
+    let r = settings.window as isize;
+    let offsets = (2 * settings.window + 1).pow(2);
+    let mut weights = vec![0.0; offsets * tile.height * tile.width.next_multiple_of(LANES)];
+    let mut patches = Patches::new(tile, settings.patch, 1);
+    for (k, (dx, dy)) in (-r..=r).flat_map(|dy| (-r..=r).map(move |dx| (dx, dy))).enumerate() {
+        patches.compare(guide, Other::At(dx, dy), settings.color * settings.color, &[settings.patch]);
+        for (block, (x, y)) in tile.blocks().enumerate() {
+            let distance = patches.mean(0, settings.patch, x, y).max(Lanes::ZERO);
+            let mut weight = (Lanes::ZERO - distance).exp_negative();
+            let row = (tile.y + y) as isize + dy;
+            let column = (tile.x + x) as isize + dx;
+            let rows = 0..guide.mean.height as isize;
+            for (i, weight) in weight.0.iter_mut().enumerate() {
+                let inside = (0..guide.mean.width as isize).contains(&(column + i as isize));
+                if !(inside && rows.contains(&row) && x + i < tile.width) {
+                    *weight = 0.0;
+                }
+            }
+            weight.store(&mut weights[(block * offsets + k) * LANES..]);
+        }
+    }
+    weights
+}
+
 /// Offsets of a window except the centre.
 fn offsets(radius: usize) -> impl Iterator<Item = (isize, isize)> {
     let r = radius as isize;

@@ -8,8 +8,8 @@ use super::form::Form;
 use super::level::Level;
 use crate::image::planes::Planes;
 use crate::math::rng;
-use crate::solve::graph::{Graph, Quad};
-use crate::solve::multigrid::Multigrid;
+use crate::solve::graph::Quad;
+use crate::solve::poisson::{Data, Weights};
 
 /// Pull towards the denoised image in the authors' form. Their gradient descent starts there and stops after a
 /// thousand small steps; a penalty of this weight acts alike on every frequency (docs/frgr.md).
@@ -59,34 +59,28 @@ pub fn enhance(level: &Level, denoised: &Planes, error: &Planes, form: Form, spp
     let edges = [edges(0), edges(1)];
     let [across, down]: [Vec<f32>; 2] = [0, 1].map(|axis: usize| edges[axis].par_iter().map(Weight::sum).collect());
     let screen: Vec<f32> = pixels().map(|at| screen(level, error, form, spp, at)).collect();
-    let pull = |axis: usize, c: usize, x: usize, y: usize| {
-        edges[axis][y * width + x].sampled * level.gradients[axis].at(c, x as isize, y as isize)
+    let quads = |planes: &Planes| -> Vec<Quad> {
+        pixels().map(|(x, y)| [planes.at(0, x, y), planes.at(1, x, y), planes.at(2, x, y), 0.0]).collect()
     };
-    let start = |i: usize| {
-        let value = |c| denoised.at(c, (i % width) as isize, (i / width) as isize);
-        [value(0), value(1), value(2), 0.0]
+    let data = quads(denoised);
+    // A sampled difference and one of zero together pull like their mean.
+    let pull = |axis: usize| -> Vec<Quad> {
+        let share = edges[axis].par_iter().map(|weight| weight.sampled / weight.sum());
+        let sampled = quads(&level.gradients[axis]);
+        sampled.into_par_iter().zip(share).map(|(edge, share)| edge.map(|value| share * value)).collect()
     };
-    // Right-hand sides of the normal equations; the fourth is random signs, for the error.
-    let right = |i: usize| {
-        let (x, y) = (i % width, i / width);
-        let value = |c: usize| {
-            let mut sum = screen[i] * start(i)[c];
-            sum += if x > 0 { pull(0, c, x - 1, y) } else { 0.0 } - if x + 1 < width { pull(0, c, x, y) } else { 0.0 };
-            sum += if y > 0 { pull(1, c, x, y - 1) } else { 0.0 } - if y + 1 < height { pull(1, c, x, y) } else { 0.0 };
-            sum
-        };
-        [value(0), value(1), value(2), sign(i)]
-    };
-    let right: Vec<Quad> = (0..width * height).into_par_iter().map(right).collect();
-    let solver = Multigrid::new(Graph::from_grid(width, &across, &down, &screen));
-    let start = (0..width * height).into_par_iter().map(start).collect();
-    let solved = solver.solve(&right, start, TOLERANCE).x;
+    let weights = Weights { across, down, screen };
+    let [dx, dy] = [pull(0), pull(1)];
+    let mut right = weights.right(Data { width, data: &data, edges: [&dx, &dy] });
+    // The fourth channel is random signs, for the error.
+    right.iter_mut().enumerate().for_each(|(i, right)| right[3] = sign(i));
+    let solved = weights.solver(width).solve(&right, data, TOLERANCE).x;
     let image = Planes::from_fn(width, height, 3, |c, x, y| solved[y * width + x][c]);
     let error = (form == Form::Best).then(|| {
         // The inverse of the matrix is the covariance of the errors when all weights are inverse variances. The
         // expectation of z times (inverse z) over random signs z is its diagonal; the mean over some pixels stands for
         // it. Gradients only add to what is known: the error is no larger than the denoised image's.
-        let most = Planes::from_fn(width, height, 1, |_, x, y| 1.0 / screen[y * width + x]);
+        let most = Planes::from_fn(width, height, 1, |_, x, y| 1.0 / weights.screen[y * width + x]);
         let sample = Planes::from_fn(width, height, 1, |_, x, y| sign(y * width + x) * solved[y * width + x][3]);
         let clipped = |sample: &Planes| sample.zip(&most, |value, most| value.clamp(0.0, most));
         clipped(&clipped(&sample).box_mean(2))

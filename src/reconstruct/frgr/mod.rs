@@ -11,7 +11,6 @@
 //! be is known from the gradients, enhanced into those of an image; how much noise they carry from their variances.
 
 mod enhance;
-mod features;
 mod filter;
 mod form;
 mod level;
@@ -22,14 +21,15 @@ mod resample;
 use std::borrow::Cow;
 
 use self::enhance::{Enhanced, enhance};
-use self::features::{Feature, Kind};
 use self::filter::{Problem, Solver, Term};
 use self::form::Form;
-use self::level::{Inputs, Level};
+use self::level::Level;
 use self::resample::Resampling;
+use super::features::{Feature, Kind};
+use super::inputs::{Inputs, too_little};
 use super::{Context, Method, Note, Parameter, Parameters, Reconstruction, Solution};
 use crate::error::{Error, Result};
-use crate::film::{Frame, Layer, Needs};
+use crate::film::{Frame, Needs};
 use crate::image::Image;
 use crate::image::nl_means::rdfc::{self, Denoised};
 use crate::image::nl_means::{Guide, Guides};
@@ -70,15 +70,10 @@ struct Frgr {
 }
 
 fn make(parameters: &Parameters) -> Result<Box<dyn Reconstruction>> {
-    let switch = |name: &str| {
-        let text: String = parameters.get(name, "on or off", |text: &String| ["on", "off"].contains(&text.as_str()))?;
-        Ok::<_, Error>(text == "on")
-    };
-    let resample: String =
-        parameters.get("resample", "glu or bilinear", |text: &String| ["glu", "bilinear"].contains(&text.as_str()))?;
+    let resample = parameters.choice("resample", &["glu", "bilinear"])?;
     let mut features = Vec::new();
     for (name, kind) in [("albedo", Kind::Albedo), ("normal", Kind::Normal)] {
-        if switch(name)? {
+        if parameters.switch(name)? {
             features.push(kind);
         }
     }
@@ -89,8 +84,8 @@ fn make(parameters: &Parameters) -> Result<Box<dyn Reconstruction>> {
         solver: parameters.get("solver", "sweeps or exact", |_| true)?,
         guided: resample == "glu",
         features,
-        denoised: switch("denoised")?,
-        enhance: switch("enhance")?,
+        denoised: parameters.switch("denoised")?,
+        enhance: parameters.switch("enhance")?,
     }))
 }
 
@@ -171,12 +166,8 @@ impl Frgr {
         let ([dx, dx_noise], [dy, dy_noise]) = (clean(0)?, clean(1)?);
         let mut features = Vec::new();
         for &kind in &self.features {
-            let (mean, variance) = match kind {
-                Kind::Albedo => (Layer::Albedo, Layer::AlbedoVariance),
-                Kind::Normal => (Layer::Normal, Layer::NormalVariance),
-            };
-            if frame.get(mean).is_some() {
-                features.push(Feature::clean(kind, &inputs.planes(mean, 1.0)?, &inputs.planes(variance, 1.0)?));
+            if frame.get(kind.layers()[0]).is_some() {
+                features.push(Feature::of(kind, inputs)?);
             }
         }
         let level = Level { color, variance, gradients: [dx, dy], noise: [dx_noise, dy_noise], features };
@@ -280,10 +271,7 @@ fn rows(inputs: &Inputs, memory: Option<u64>) -> Result<usize> {
     let row = 4 * BAND_FLOATS * width;
     let least = levels + row * LEAST_ROWS.min(height);
     if memory < least {
-        let needed = least.div_ceil(1 << 20);
-        return Err(Error::Usage(format!(
-            "reconstructing {width}x{height} pixels with frgr takes {needed} MB besides the layers; allow it with --max-memory {needed}"
-        )));
+        return Err(too_little("frgr", (inputs.width, inputs.height), least.div_ceil(1 << 20)));
     }
     Ok(((memory - levels) / row).min(height) as usize)
 }

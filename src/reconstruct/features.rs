@@ -1,5 +1,8 @@
 //! Albedo and normal: cleaned of their own noise, and what counts as alike in them.
 
+use super::inputs::Inputs;
+use crate::error::Result;
+use crate::film::Layer;
 use crate::image::nl_means::Guide;
 use crate::image::planes::{Planes, Tile};
 use crate::math::lanes::Lanes;
@@ -23,6 +26,16 @@ pub enum Kind {
     Normal,
 }
 
+impl Kind {
+    /// Its mean and its variance.
+    pub fn layers(self) -> [Layer; 2] {
+        match self {
+            Self::Albedo => [Layer::Albedo, Layer::AlbedoVariance],
+            Self::Normal => [Layer::Normal, Layer::NormalVariance],
+        }
+    }
+}
+
 /// Beyond two pixels the weights of [`Feature::clean`] are e^-9 or less.
 const RADIUS: isize = 2;
 
@@ -30,6 +43,12 @@ const RADIUS: isize = 2;
 const ALIKE: f32 = 1e-3;
 
 impl Feature {
+    /// A feature of a frame, cleaned.
+    pub fn of(kind: Kind, inputs: &Inputs) -> Result<Self> {
+        let [mean, variance] = kind.layers();
+        Ok(Self::clean(kind, &inputs.planes(mean, 1.0)?, &inputs.planes(variance, 1.0)?))
+    }
+
     /// A feature cleaned by a bilateral filter: pixels whose difference noise explains are averaged.
     pub fn clean(kind: Kind, mean: &Planes, variance: &Planes) -> Self {
         let noise = variance.sum();

@@ -1,0 +1,93 @@
+//! A scene with what its images are measured against.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use crate::error::{Error, Result};
+use crate::image::{Image, io};
+use crate::reference::Reference;
+use crate::scene::{Scene, load};
+
+/// A reference image.
+pub struct Truth {
+    /// Radiance, directly seen emitters included.
+    pub image: Image,
+    /// Its own expected relMSE, where it is known.
+    pub floor: Option<f64>,
+}
+
+/// A loaded scene and its reference.
+pub struct Case {
+    /// Name of the folder, or of the file if it is not a `scene.xml`.
+    pub name: String,
+    /// The scene, at the reference's size.
+    pub scene: Scene,
+    /// What its images are measured against.
+    pub truth: Truth,
+    /// Seconds that reading it and building the hierarchy took.
+    pub load: f64,
+}
+
+impl Case {
+    /// Loads a scene, finds its reference and makes sure that it is one. `reference` is a file, a folder with files
+    /// named after scenes, or none: then it lies beside the scene, or in a folder `references` beside the scene's.
+    pub fn load(path: &Path, reference: Option<&Path>, size: Option<(usize, usize)>) -> Result<Self> {
+        let name = name(path);
+        let file = find(path, &name, reference)?;
+        let (truth, known) = truth(&file)?;
+        let there = (truth.image.width, truth.image.height);
+        let start = Instant::now();
+        let own = load::load(path, &load::Options { size: size.or(Some(there)), ..load::Options::default() })?;
+        let load = start.elapsed().as_secs_f64();
+        let wanted = (own.sensor().width, own.sensor().height);
+        if wanted != there {
+            let what = format!("has {}x{} pixels, not {}x{}", there.0, there.1, wanted.0, wanted.1);
+            return Err(Error::io(&file, what));
+        }
+        if let Some(known) = known {
+            known.check(&file, &own)?;
+        }
+        Ok(Self { name, scene: own, truth, load })
+    }
+}
+
+/// Name of a scene file.
+fn name(path: &Path) -> String {
+    let stem = path.file_stem().unwrap_or_default();
+    let folder = path.canonicalize().ok().and_then(|path| Some(path.parent()?.file_name()?.to_owned()));
+    let name = if stem == "scene" { folder.unwrap_or_else(|| stem.to_owned()) } else { stem.to_owned() };
+    name.to_string_lossy().into_owned()
+}
+
+fn find(path: &Path, name: &str, reference: Option<&Path>) -> Result<PathBuf> {
+    let folder = path.parent().map_or(PathBuf::from("."), Path::to_path_buf);
+    let file = format!("{name}.exr");
+    let places = match reference {
+        Some(reference) if reference.is_dir() => vec![reference.join(file)],
+        Some(reference) => vec![reference.to_path_buf()],
+        None => vec![
+            folder.join("reference.exr"),
+            folder.join("../references").join(&file),
+            Path::new("scenes/references").join(&file),
+        ],
+    };
+    places.iter().find(|place| place.is_file()).cloned().ok_or_else(|| {
+        let places: Vec<_> = places.iter().map(|place| place.display().to_string()).collect();
+        let what = format!("no reference at {}; `fluxion reference` makes one", places.join(", "));
+        Error::io(path, what)
+    })
+}
+
+/// The image of a file, and the whole reference if it is one of Fluxion's own.
+fn truth(path: &Path) -> Result<(Truth, Option<Reference>)> {
+    if !Reference::is_one(path)? {
+        let image = io::read_color(path)?;
+        if let Some(at) = image.data.iter().position(|value| !value.is_finite()) {
+            let (x, y) = (at / 3 % image.width, at / 3 / image.width);
+            return Err(Error::io(path, format!("the value at pixel {x},{y} is not finite")));
+        }
+        return Ok((Truth { image, floor: None }, None));
+    }
+    let reference = Reference::load(path)?;
+    Ok((Truth { image: reference.image.clone(), floor: Some(reference.floor()) }, Some(reference)))
+}

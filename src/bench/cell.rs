@@ -1,0 +1,174 @@
+//! One run: render, develop, reconstruct, measure.
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::str::FromStr;
+use std::sync::atomic::AtomicBool;
+use std::time::{Duration, Instant};
+
+use super::case::Case;
+use super::record::{Record, Seconds, machine};
+use crate::error::{Error, Result};
+use crate::film::{Frame, Needs};
+use crate::image::Image;
+use crate::math::rng;
+use crate::metrics::METRICS;
+use crate::plan::Plan;
+use crate::reconstruct::{self, Context, Reconstruction};
+use crate::reference::fingerprint;
+use crate::render::gradient::shift::Shift;
+use crate::render::{self, Control, Settings, render};
+
+/// What a run may use up.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Budget {
+    /// Seconds for render and reconstruction together.
+    Seconds(f64),
+    /// Samples per pixel.
+    Spp(u32),
+}
+
+impl fmt::Display for Budget {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Seconds(seconds) => write!(f, "{seconds}s"),
+            Self::Spp(spp) => write!(f, "{spp}spp"),
+        }
+    }
+}
+
+impl FromStr for Budget {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        let spp = text.strip_suffix("spp").and_then(|n| n.parse().ok()).filter(|&n| n > 0).map(Self::Spp);
+        let seconds = || text.strip_suffix('s').and_then(|n| n.parse().ok()).filter(|&n: &f64| n > 0.0 && n < 1e9);
+        spp.or_else(|| seconds().map(Self::Seconds))
+            .ok_or_else(|| Error::Usage(format!("`{text}` is no budget: write 5s or 64spp")))
+    }
+}
+
+/// How long the parts of a run take on a scene, from trying.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Pilot {
+    /// One sample of every pixel.
+    pub sample: f64,
+    /// Develop and reconstruct.
+    pub finish: f64,
+}
+
+/// A method on a scene.
+pub struct Runner<'a> {
+    /// The scene.
+    pub case: &'a Case,
+    /// The method as it was asked for.
+    pub method: &'a str,
+    made: Box<dyn Reconstruction>,
+    needs: Needs,
+    lit: bool,
+}
+
+/// A run and its image.
+pub struct Ran {
+    /// What is kept of it.
+    pub record: Record,
+    /// What was made.
+    pub image: Image,
+}
+
+impl<'a> Runner<'a> {
+    /// Builds the method and decides what to render for it.
+    pub fn new(case: &'a Case, method: &'a str) -> Result<Self> {
+        let made = reconstruct::parse(method)?;
+        let needs = Plan::new(&case.scene, made.needs(), Needs::default()).needs;
+        let lit = needs.edges || !made.needs().edges;
+        Ok(Self { case, method, made, needs, lit })
+    }
+
+    fn frame(&self, budget: render::Budget, seed: u64, seconds: &mut Seconds) -> (render::Outcome, Frame) {
+        let settings = Settings { budget, seed, first: 0, needs: self.needs, shift: Shift::default() };
+        let outcome = render(&self.case.scene, settings, &Control { stop: &AtomicBool::new(false), progress: &|_| {} });
+        seconds.render = outcome.elapsed.as_secs_f64();
+        let start = Instant::now();
+        let mut frame = outcome.film.develop();
+        if !self.lit {
+            frame.fill_dark_edges();
+        }
+        seconds.develop = start.elapsed().as_secs_f64();
+        (outcome, frame)
+    }
+
+    fn finish(&self, frame: &Frame, seconds: &mut Seconds) -> Result<Image> {
+        let start = Instant::now();
+        let context = Context { progress: &|_, _| {}, memory: None, notes: false };
+        let image = reconstruct::solve(self.made.as_ref(), frame, &context)?.image;
+        seconds.reconstruct = start.elapsed().as_secs_f64();
+        Ok(image)
+    }
+
+    /// Tries with two samples per pixel; the reconstruction twice, since the first may load libraries.
+    pub fn pilot(&self) -> Result<Pilot> {
+        let mut seconds = Seconds::default();
+        let (_, frame) = self.frame(render::Budget::Spp(2), 0, &mut seconds);
+        self.finish(&frame, &mut seconds)?;
+        let first = seconds.reconstruct;
+        if first < 1.0 {
+            self.finish(&frame, &mut seconds)?;
+        }
+        let finish = seconds.develop + seconds.reconstruct.min(first);
+        Ok(Pilot { sample: seconds.render / 2.0, finish })
+    }
+
+    /// Runs with a seed, within a budget; `pilot` says how long the reconstruction is going to take.
+    pub fn run(&self, budget: Budget, seed: u64, pilot: Pilot) -> Result<Ran> {
+        reset_peak();
+        let mut seconds = Seconds { load: self.case.load, ..Seconds::default() };
+        let allowed = match budget {
+            Budget::Spp(spp) => render::Budget::Spp(spp),
+            Budget::Seconds(total) => render::Budget::Time(Duration::from_secs_f64((total - pilot.finish).max(1e-6))),
+        };
+        // Runs of different budgets do not share samples; those of different methods do.
+        let salt = budget.to_string().bytes().fold(0, |hash, byte| rng::combine(hash, u64::from(byte)));
+        let (outcome, frame) = self.frame(allowed, rng::combine(seed, salt), &mut seconds);
+        let image = self.finish(&frame, &mut seconds)?;
+        seconds.total = seconds.render + seconds.develop + seconds.reconstruct;
+        let peak_bytes = peak_bytes();
+        let mut metrics = BTreeMap::new();
+        for metric in METRICS {
+            metrics.insert(metric.id.to_owned(), metric.measure(&image, &self.case.truth.image)?.mean);
+        }
+        let negative = image.data.iter().filter(|&&value| value < 0.0).count() as f64 / image.data.len() as f64;
+        let record = Record {
+            scene: self.case.name.clone(),
+            method: self.method.to_owned(),
+            budget: budget.to_string(),
+            seed,
+            width: image.width,
+            height: image.height,
+            fingerprint: fingerprint(&self.case.scene),
+            spp: outcome.spp,
+            seconds,
+            metrics,
+            negative,
+            rejected: outcome.film.rejected(),
+            peak_bytes,
+            floor: self.case.truth.floor,
+            machine: machine(),
+            version: env!("CARGO_PKG_VERSION").into(),
+        };
+        Ok(Ran { record, image })
+    }
+}
+
+/// Forgets the largest memory so far, where the system can.
+fn reset_peak() {
+    // Best effort: without it later runs show the peak of earlier ones.
+    let _ = std::fs::write("/proc/self/clear_refs", "5");
+}
+
+/// Largest resident set of the process since the last reset; 0 where the system does not say.
+pub fn peak_bytes() -> u64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
+    line.and_then(|rest| rest.trim().trim_end_matches("kB").trim().parse::<u64>().ok()).unwrap_or(0) * 1024
+}

@@ -1,0 +1,11 @@
+//! Error against run time: scenes x methods x budgets x seeds, each rendered and reconstructed by itself, as records.
+
+mod case;
+mod cell;
+mod record;
+mod store;
+
+pub use self::case::{Case, Truth};
+pub use self::cell::{Budget, Pilot, Ran, Runner, peak_bytes};
+pub use self::record::{LeftOut, Record, Results, Seconds, machine};
+pub use self::store::Store;

@@ -1,0 +1,284 @@
+//! `fluxion bench`.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use anyhow::{Result, bail};
+use fluxion::bench::{Budget, Case, LeftOut, Pilot, Ran, Results, Runner, Store};
+use fluxion::error::Error;
+use fluxion::reconstruct::{self, METHODS};
+use fluxion::report::{Page, Shown, Summary, View, changes, table};
+
+use super::progress;
+
+/// Options of `bench`.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Scene files, or folders that hold a scene.xml or folders that do
+    #[arg(required = true)]
+    scenes: Vec<PathBuf>,
+    /// Methods with their parameters, separated by commas [default: all]
+    #[arg(long, value_name = "NAME[:KEY=VALUE,...],...")]
+    methods: Option<String>,
+    /// Times that render and reconstruction together may take, as in 2s,5s,20s
+    #[arg(long, value_delimiter = ',', value_parser = super::parse_time, value_name = "TIME,...", required_unless_present = "spp")]
+    times: Vec<Duration>,
+    /// Samples per pixel instead
+    #[arg(long, value_delimiter = ',', conflicts_with = "times", value_name = "SPP,...", value_parser = clap::value_parser!(u32).range(1..))]
+    spp: Vec<u32>,
+    /// Runs of everything with different random numbers
+    #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u64).range(1..1000))]
+    seeds: u64,
+    /// Where references are: a file, a folder with files named after scenes, or `auto`: reference.exr beside the scene,
+    /// or a file named after it in a folder `references` beside the scene's or in scenes/
+    #[arg(long, default_value = "auto", value_name = "FILE|DIR")]
+    reference: PathBuf,
+    /// Film size, which the references must have [default: theirs]
+    #[arg(long, value_parser = super::parse_size, value_name = "WxH")]
+    size: Option<(usize, usize)>,
+    /// Folder for results.json, results.csv, index.html and images, rewritten after every run
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+    /// Go on with the results that are in the folder
+    #[arg(long)]
+    resume: bool,
+    /// Earlier results.json, to mark what got better and worse beyond the noise of the seeds
+    #[arg(long, value_name = "FILE")]
+    baseline: Option<PathBuf>,
+    /// Threads to work with (0: one per core)
+    #[arg(long, default_value_t = 0)]
+    threads: usize,
+    /// Show no progress
+    #[arg(short, long)]
+    quiet: bool,
+}
+
+/// A share of the smallest error that a reference's own noise should stay below.
+const FLOOR_SHARE: f64 = 0.1;
+
+/// Runs everything, and writes the page.
+pub fn run(args: &Args) -> Result<ExitCode> {
+    super::use_threads(args.threads)?;
+    let methods = methods(args.methods.as_deref())?;
+    let scenes = scenes(&args.scenes)?;
+    let budgets: Vec<Budget> = match args.times.is_empty() {
+        true => args.spp.iter().map(|&spp| Budget::Spp(spp)).collect(),
+        false => args.times.iter().map(|time| Budget::Seconds(time.as_secs_f64())).collect(),
+    };
+    let baseline = args.baseline.as_deref().map(Results::load).transpose()?;
+    let mut store = Store::open(&args.output, args.resume)?;
+    // Whatever is wrong with a scene or a reference is said before the first run.
+    for scene in &scenes {
+        check(&load(args, scene)?, &budgets)?;
+    }
+    let stop = super::stop_on_interrupt()?;
+    let bar = progress::bar(args.quiet);
+    let total = scenes.len() * methods.len() * budgets.len() * args.seeds as usize;
+    let mut done = 0;
+    for scene in &scenes {
+        let case = load(args, scene)?;
+        let mut bench = Bench { args, case: &case, budgets: &budgets, store: &mut store, stop: &stop };
+        bench.run(&methods, &mut |what| {
+            done += 1;
+            bar.set_message(format!("{}, {what}", case.name));
+            progress::set(&bar, done as f32 / total as f32);
+        })?;
+        if stop.load(Ordering::Relaxed) {
+            break;
+        }
+    }
+    bar.finish_and_clear();
+    store.save()?;
+    write_page(args, &store, &scenes, &budgets, baseline.as_ref())?;
+    println!("{}", table(&Summary::new(&store.results, "relmse")).trim_end());
+    warn_of_floors(&store.results);
+    if stop.load(Ordering::Relaxed) {
+        eprintln!("warning: stopped early; --resume goes on with what is missing");
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Methods of a list. What follows a method's colon belongs to it as long as it looks like a parameter.
+fn methods(list: Option<&str>) -> Result<Vec<String>> {
+    let mut methods: Vec<String> = Vec::new();
+    match list {
+        None => methods.extend(METHODS.iter().map(|method| method.id.to_owned())),
+        Some(list) => {
+            for part in list.split(',').map(str::trim) {
+                match methods.last_mut() {
+                    Some(last) if part.contains('=') && !part.contains(':') => *last += &format!(",{part}"),
+                    _ => methods.push(part.to_owned()),
+                }
+            }
+        }
+    }
+    for (k, method) in methods.iter().enumerate() {
+        reconstruct::parse(method)?;
+        if methods[..k].contains(method) {
+            bail!(Error::Usage(format!("method {method} is there twice")));
+        }
+    }
+    Ok(methods)
+}
+
+/// Scene files, those in folders sorted by name.
+fn scenes(paths: &[PathBuf]) -> Result<Vec<PathBuf>> {
+    let mut scenes = Vec::new();
+    for path in paths {
+        if !path.is_dir() || path.join("scene.xml").is_file() {
+            scenes.push(if path.is_dir() { path.join("scene.xml") } else { path.clone() });
+            continue;
+        }
+        let entries = std::fs::read_dir(path).map_err(|error| Error::io(path, error))?;
+        let mut inside: Vec<_> = entries.filter_map(|entry| Some(entry.ok()?.path().join("scene.xml"))).collect();
+        inside.retain(|scene| scene.is_file());
+        inside.sort();
+        if inside.is_empty() {
+            bail!(Error::io(path, "holds neither a scene.xml nor folders with one"));
+        }
+        scenes.append(&mut inside);
+    }
+    Ok(scenes)
+}
+
+fn load(args: &Args, scene: &Path) -> Result<Case> {
+    let reference = (args.reference.as_os_str() != "auto").then_some(args.reference.as_path());
+    Ok(Case::load(scene, reference, args.size)?)
+}
+
+/// Fails if a budget is not enough for a single sample of path tracing.
+fn check(case: &Case, budgets: &[Budget]) -> Result<()> {
+    if case.truth.floor.is_none() {
+        eprintln!("warning: the reference of {} does not say what scene it is of, nor how noisy it is", case.name);
+    }
+    let least = budgets.iter().filter_map(|budget| match budget {
+        Budget::Seconds(seconds) => Some(*seconds),
+        Budget::Spp(_) => None,
+    });
+    let Some(least) = least.min_by(f64::total_cmp) else { return Ok(()) };
+    let needed = Runner::new(case, "primal")?.pilot()?.sample;
+    if least < needed {
+        bail!(Error::Usage(format!(
+            "{least} s are below one sample per pixel of {}, which takes {needed:.2} s: give it more, or less pixels",
+            case.name
+        )));
+    }
+    Ok(())
+}
+
+/// All runs on a scene.
+struct Bench<'a> {
+    args: &'a Args,
+    case: &'a Case,
+    budgets: &'a [Budget],
+    store: &'a mut Store,
+    stop: &'a AtomicBool,
+}
+
+impl Bench<'_> {
+    fn run(&mut self, methods: &[String], report: &mut dyn FnMut(&str)) -> Result<()> {
+        let runners = methods.iter().map(|method| Runner::new(self.case, method)).collect::<Result<Vec<_>, _>>()?;
+        let mut pilots = vec![None; methods.len()];
+        for seed in 1..=self.args.seeds {
+            for (k, budget) in self.budgets.iter().enumerate() {
+                // Methods take turns, and begin with another one every time.
+                for turn in 0..runners.len() {
+                    let which = (turn + k + seed as usize) % runners.len();
+                    report(&format!("{}, {budget}, seed {seed}", methods[which]));
+                    self.cell(&runners[which], &mut pilots[which], *budget, seed)?;
+                    if self.stop.load(Ordering::Relaxed) {
+                        return Ok(());
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn cell(&mut self, runner: &Runner, pilot: &mut Option<Pilot>, budget: Budget, seed: u64) -> Result<()> {
+        let (scene, method, text) = (&self.case.name, runner.method, budget.to_string());
+        if self.store.has(self.case, method, &text, seed)? {
+            return Ok(());
+        }
+        let tried = match *pilot {
+            Some(tried) => tried,
+            None => *pilot.insert(runner.pilot()?),
+        };
+        if let Budget::Seconds(seconds) = budget
+            && seconds < tried.finish + tried.sample
+        {
+            let (scene, method) = (scene.clone(), method.to_owned());
+            let reason = format!("reconstruction takes {:.1} s", tried.finish);
+            let left = &mut self.store.results.left_out;
+            if !left.iter().any(|left| left.scene == scene && left.method == method && left.budget == text) {
+                left.push(LeftOut { scene, method, budget: text, reason });
+            }
+            return Ok(());
+        }
+        let ran: Ran = runner.run(budget, seed, tried)?;
+        // The next run of this method knows better how long it takes.
+        let seconds = ran.record.seconds;
+        *pilot = Some(Pilot { finish: seconds.develop + seconds.reconstruct, ..tried });
+        Ok(self.store.add(ran)?)
+    }
+}
+
+/// The page: plots of everything, and the images of the middle budget.
+fn write_page(
+    args: &Args,
+    store: &Store,
+    scenes: &[PathBuf],
+    budgets: &[Budget],
+    baseline: Option<&Results>,
+) -> Result<()> {
+    let mut names: Vec<&str> = Vec::new();
+    let mut methods: Vec<&str> = Vec::new();
+    for record in &store.results.records {
+        for (list, name) in [(&mut names, record.scene.as_str()), (&mut methods, record.method.as_str())] {
+            if !list.contains(&name) {
+                list.push(name);
+            }
+        }
+    }
+    let budget = budgets[budgets.len() / 2].to_string();
+    let mut views = Vec::new();
+    for scene in scenes {
+        let case = load(args, scene)?;
+        let shown = methods.iter().filter_map(|&method| {
+            Some(Shown { label: method.to_owned(), image: store.image(&case.name, method, &budget)? })
+        });
+        let images: Vec<_> = shown.collect();
+        if !images.is_empty() {
+            views.push(View { name: format!("{}, {budget}", case.name), reference: case.truth.image, images });
+        }
+    }
+    let changes = baseline.map_or_else(Vec::new, |then| changes(&store.results, then, "relmse"));
+    let certain = changes.iter().filter(|change| change.verdict != 0);
+    for change in certain {
+        let word = if change.verdict < 0 { "better" } else { "worse" };
+        println!("{word}: {} on {}, {}: {:.3} of the error", change.method, change.scene, change.budget, change.ratio);
+    }
+    let page = Page { title: "Error against run time".into(), results: Some(&store.results), changes, views };
+    Ok(store.write("index.html", &page.html()?)?)
+}
+
+/// Says which references are too noisy for the errors that were measured by them.
+fn warn_of_floors(results: &Results) {
+    let mut scenes: Vec<&str> = results.records.iter().map(|record| record.scene.as_str()).collect();
+    scenes.dedup();
+    for scene in scenes {
+        let own = results.records.iter().filter(|record| record.scene == scene);
+        let errors = own.clone().filter_map(|record| record.metrics.get("relmse").copied());
+        let least = errors.fold(f64::INFINITY, f64::min);
+        let floor = own.filter_map(|record| record.floor).next().unwrap_or(0.0);
+        if floor > FLOOR_SHARE * least {
+            eprintln!(
+                "warning: the reference of {scene} has a relMSE of {floor:.1e} itself, {:.0} % of the smallest error; \
+                 `fluxion reference` can go on with it",
+                100.0 * floor / least
+            );
+        }
+    }
+}

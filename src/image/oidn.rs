@@ -1,0 +1,24 @@
+//! Images denoised by Open Image Denoise.
+
+use super::Image;
+use crate::error::{Error, Result};
+use crate::ffi::oidn::Device;
+
+/// Denoises linear radiance with the help of albedo and normal. `clean` filters these first, which Open Image Denoise
+/// calls accurate prefiltering.
+pub fn denoise(color: &Image, albedo: &Image, normal: &Image, clean: bool) -> Result<Image> {
+    let size = (color.width, color.height);
+    let run = || {
+        let device = Device::new(rayon::current_num_threads())?;
+        let color = (c"color", color.data.as_slice());
+        let data = if clean {
+            let albedo = device.filter(size, &[(c"albedo", &albedo.data)], &[])?;
+            let normal = device.filter(size, &[(c"normal", &normal.data)], &[])?;
+            device.filter(size, &[color, (c"albedo", &albedo), (c"normal", &normal)], &[c"hdr", c"cleanAux"])?
+        } else {
+            device.filter(size, &[color, (c"albedo", &albedo.data), (c"normal", &normal.data)], &[c"hdr"])?
+        };
+        Ok(Image { data, ..Image::new(size.0, size.1, 3) })
+    };
+    run().map_err(|what: String| Error::Usage(format!("open image denoise: {what}")))
+}

@@ -1,0 +1,165 @@
+//! A frame as reconstructions work on it: planes, in units of the image's typical luminance.
+
+use rayon::prelude::*;
+
+use super::Context;
+use crate::error::{Error, Result};
+use crate::film::{Frame, Layer};
+use crate::image::Image;
+use crate::image::planes::{Planes, mirror};
+use crate::solve::graph::Quad;
+
+/// Scattered radiance, as layers of a frame.
+pub struct Inputs<'a> {
+    /// Where they come from.
+    pub frame: &'a Frame,
+    /// Pixels in a row, after mirroring.
+    pub width: usize,
+    /// Rows, after mirroring.
+    pub height: usize,
+    /// What radiance is multiplied by: results then do not depend on the exposure.
+    pub scale: f32,
+    /// Mean number of samples of a pixel.
+    pub spp: f32,
+}
+
+impl<'a> Inputs<'a> {
+    /// The inputs of a frame, mirrored until both sides are multiples of `multiple`.
+    pub fn new(frame: &'a Frame, multiple: usize) -> Result<Self> {
+        let scale = 1.0 / typical_luminance(frame.require(Layer::Color)?);
+        let samples = &frame.require(Layer::Samples)?.data;
+        let spp = (samples.iter().map(|&n| f64::from(n)).sum::<f64>() / samples.len() as f64).max(1.0) as f32;
+        let (width, height) = (frame.width.next_multiple_of(multiple), frame.height.next_multiple_of(multiple));
+        Ok(Self { frame, width, height, scale, spp })
+    }
+
+    /// A layer times `scale`.
+    pub fn planes(&self, layer: Layer, scale: f32) -> Result<Planes> {
+        let image = self.frame.require(layer)?;
+        let channels = image.channels;
+        Ok(Planes::from_fn(self.width, self.height, channels, |c, x, y| {
+            let (x, y) = (self.inside(x, image.width), self.inside(y, image.height));
+            image.data[(y * image.width + x) * channels + c] * scale
+        }))
+    }
+
+    /// Radiance and its variance.
+    pub fn color(&self) -> Result<[Planes; 2]> {
+        Ok([self.planes(Layer::Color, self.scale)?, self.planes(Layer::ColorVariance, self.scale * self.scale)?])
+    }
+
+    /// Differences along `axis` (0: to the right, 1: downwards) and their variances. Where the image is mirrored
+    /// differences change their sign.
+    pub fn gradient(&self, axis: usize) -> Result<[Planes; 2]> {
+        let (mean, variance) = [(Layer::Dx, Layer::DxVariance), (Layer::Dy, Layer::DyVariance)][axis];
+        let step = [(1, 0), (0, 1)][axis];
+        let edges = |layer, scale: f32, back: f32| {
+            let image = self.frame.require(layer)?;
+            let (w, h) = (image.width, image.height);
+            Ok::<_, crate::error::Error>(Planes::from_fn(self.width, self.height, 3, |c, x, y| {
+                let near = (self.inside(x, w), self.inside(y, h));
+                let far = (self.inside(x + step.0, w), self.inside(y + step.1, h));
+                let value = |(x, y): (usize, usize)| image.data[(y * w + x) * 3 + c] * scale;
+                match () {
+                    () if far.0 + far.1 > near.0 + near.1 => value(near),
+                    () if far.0 + far.1 < near.0 + near.1 => back * value(far),
+                    () => 0.0,
+                }
+            }))
+        };
+        Ok([edges(mean, self.scale, -1.0)?, edges(variance, self.scale * self.scale, 1.0)?])
+    }
+
+    /// Three channels of a layer times [`Inputs::scale`], pixel by pixel, as solvers take them. Not mirrored.
+    pub fn quads(&self, layer: Layer) -> Result<Vec<Quad>> {
+        let pixels = self.frame.require(layer)?.data.par_chunks_exact(3);
+        Ok(pixels.map(|rgb| [rgb[0] * self.scale, rgb[1] * self.scale, rgb[2] * self.scale, 0.0]).collect())
+    }
+
+    /// The image of a solution of the solvers.
+    pub fn image(&self, solution: &[Quad]) -> Image {
+        let data = solution.iter().flat_map(|quad| [quad[0], quad[1], quad[2]].map(|value| value / self.scale));
+        Image { data: data.collect(), ..Image::new(self.frame.width, self.frame.height, 3) }
+    }
+
+    /// A half of the samples' colour, times [`Inputs::scale`]; not mirrored.
+    pub fn half(&self, half: usize) -> Result<Planes> {
+        let [mean, _] = self.frame.half(Layer::BinColor, half)?;
+        let at = |c, x, y| mean.data[(y * mean.width + x) * 3 + c] * self.scale;
+        Ok(Planes::from_fn(mean.width, mean.height, 3, at))
+    }
+
+    /// Fails if a method that takes so many bytes for every pixel may not.
+    pub fn check_memory(&self, context: &Context, method: &str, bytes: u64) -> Result<()> {
+        let needed = (bytes * (self.width * self.height) as u64).div_ceil(1 << 20);
+        if context.memory.is_some_and(|memory| memory < needed << 20) {
+            return Err(too_little(method, (self.width, self.height), needed));
+        }
+        Ok(())
+    }
+
+    fn inside(&self, at: usize, length: usize) -> usize {
+        if at < length { at } else { mirror(at as isize, length) }
+    }
+}
+
+/// The error of a method that needs so many megabytes.
+pub fn too_little(method: &str, (width, height): (usize, usize), megabytes: u64) -> Error {
+    Error::Usage(format!(
+        "reconstructing {width}x{height} pixels with {method} takes {megabytes} MB besides the layers; allow it with \
+         --max-memory {megabytes}"
+    ))
+}
+
+/// Variances raised to a share of the mean around them. Where all samples were zero the sample variance is zero too,
+/// which does not mean that the pixel is known.
+pub fn raise(variance: &Planes, share: f32) -> Planes {
+    variance.zip(&variance.box_mean(1), |variance, around| variance.max(share * around))
+}
+
+/// The geometric mean of the luminance, in which dark pixels count as a thousandth of the mean.
+fn typical_luminance(color: &Image) -> f32 {
+    let luminance = |pixel: &[f32]| f64::from(pixel.iter().sum::<f32>() / 3.0).max(0.0);
+    let count = color.data.len() as f64 / 3.0;
+    let mean = color.data.chunks_exact(3).map(luminance).sum::<f64>() / count;
+    if mean <= 0.0 {
+        return 1.0;
+    }
+    let log = color.data.chunks_exact(3).map(|pixel| (luminance(pixel) + 1e-3 * mean).ln()).sum::<f64>() / count;
+    log.exp() as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn mirrored_differences_are_those_of_the_mirrored_image() {
+        let mut frame = Frame::new(5, 3);
+        let image = Image::from_rgb(5, 3, |x, y| crate::math::Rgb::splat(1.0 + ((x * 7 + y * 5) % 6) as f32));
+        let step = |dx: usize, dy: usize| {
+            Image::from_rgb(5, 3, |x, y| {
+                let inside = x + dx < 5 && y + dy < 3;
+                if inside { image.rgb(x + dx, y + dy) - image.rgb(x, y) } else { crate::math::Rgb::ZERO }
+            })
+        };
+        frame.set(Layer::Dx, step(1, 0));
+        frame.set(Layer::Dy, step(0, 1));
+        frame.set(Layer::Samples, Image { data: vec![4.0; 15], ..Image::new(5, 3, 1) });
+        for layer in [Layer::DxVariance, Layer::DyVariance] {
+            frame.set(layer, Image::new(5, 3, 3));
+        }
+        frame.set(Layer::Color, image);
+        let inputs = Inputs::new(&frame, 8).unwrap();
+        assert_eq!((inputs.width, inputs.height, inputs.spp), (8, 8, 4.0));
+        let color = inputs.planes(Layer::Color, inputs.scale).unwrap();
+        for axis in 0..2 {
+            let [mean, _] = inputs.gradient(axis).unwrap();
+            for (x, y) in (0..7).flat_map(|y| (0..7).map(move |x| (x, y))) {
+                let next = if axis == 0 { (x + 1, y) } else { (x, y + 1) };
+                let expected = color.at(1, next.0, next.1) - color.at(1, x, y);
+                assert!((mean.at(1, x, y) - expected).abs() < 1e-6, "axis {axis} at {x},{y}");
+            }
+        }
+    }
+}

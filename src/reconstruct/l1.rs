@@ -1,0 +1,66 @@
+//! Screened Poisson reconstruction in the L1 norm (Kettunen et al. 2015): like `l2`, but a difference that is far off
+//! counts by its size and not by its square, so that outliers do not spread. The result is like a median: biased, and
+//! consistent.
+
+use super::inputs::Inputs;
+use super::{Context, Method, Parameter, Parameters, Reconstruction, Solution};
+use crate::error::Result;
+use crate::film::{Frame, Layer, Needs};
+use crate::solve::irls;
+use crate::solve::poisson::Data;
+
+/// `l1`.
+pub const METHOD: Method = Method {
+    id: "l1",
+    summary: "screened Poisson reconstruction that outliers among the differences do not spread in; consistent",
+    parameters: &[
+        Parameter { name: "alpha", default: "0.2", summary: "weight of the colour against the differences, > 0" },
+        Parameter {
+            name: "iterations",
+            default: "5",
+            summary: "reweighted least squares problems, 1 to 64; one makes it l2",
+        },
+        Parameter {
+            name: "epsilon",
+            default: "0.05",
+            summary: "residual below which the norm is rounded off in the first of them, over the typical luminance",
+        },
+        Parameter { name: "decay", default: "0.3", summary: "what epsilon is multiplied by from one to the next" },
+    ],
+    make,
+};
+
+/// Bytes held for every pixel besides the frame, an upper bound.
+const BYTES: u64 = 300;
+
+fn make(parameters: &Parameters) -> Result<Box<dyn Reconstruction>> {
+    Ok(Box::new(L1 {
+        alpha: parameters.get("alpha", "a number in [1e-3, 1e3]", |alpha| (1e-3..=1e3).contains(alpha))?,
+        options: irls::Options {
+            iterations: parameters.get("iterations", "a number from 1 to 64", |n| (1..=64).contains(n))?,
+            epsilon: parameters.get("epsilon", "a number in [1e-6, 1]", |epsilon| (1e-6..=1.0).contains(epsilon))?,
+            decay: parameters.get("decay", "a number in [0.1, 1]", |decay| (0.1..=1.0).contains(decay))?,
+        },
+    }))
+}
+
+struct L1 {
+    alpha: f32,
+    options: irls::Options,
+}
+
+impl Reconstruction for L1 {
+    fn needs(&self) -> Needs {
+        Needs { edges: true, ..Needs::default() }
+    }
+
+    fn reconstruct(&self, frame: &Frame, context: &Context) -> Result<Solution> {
+        let inputs = Inputs::new(frame, 1)?;
+        inputs.check_memory(context, METHOD.id, BYTES)?;
+        let (data, dx, dy) = (inputs.quads(Layer::Color)?, inputs.quads(Layer::Dx)?, inputs.quads(Layer::Dy)?);
+        let all = vec![1.0; data.len()];
+        let data = Data { width: frame.width, data: &data, edges: [&dx, &dy] };
+        let solution = irls::solve(data, [&all, &all], self.alpha, self.options);
+        Ok(Solution { image: inputs.image(&solution), error: None, notes: Vec::new() })
+    }
+}

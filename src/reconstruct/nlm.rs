@@ -1,0 +1,75 @@
+//! Non-local means (Buades et al. 2005, with the distance of Rousselle et al. 2012), of the colour alone or with
+//! features. It needs no gradients.
+
+use super::features::{Feature, Kind};
+use super::inputs::{Inputs, raise};
+use super::{Context, Method, Parameter, Parameters, Reconstruction, Solution};
+use crate::error::Result;
+use crate::film::{Frame, Needs};
+use crate::image::nl_means::{self, Guide, Guides, Settings};
+
+/// `nlm`.
+pub const METHOD: Method = Method {
+    id: "nlm",
+    summary: "non-local means of the colour; path tracing only",
+    parameters: &[
+        Parameter { name: "window", default: "9", summary: "radius of the window, 1 to 12 pixels" },
+        Parameter { name: "patch", default: "3", summary: "radius of the patches that are compared, 0 to 4 pixels" },
+        Parameter { name: "k", default: "0.45", summary: "differences that are tolerated, in standard deviations" },
+        Parameter {
+            name: "features",
+            default: "on",
+            summary: "whether albedo and normal must be alike too, `on` or `off`",
+        },
+    ],
+    make,
+};
+
+/// Bytes held for every pixel besides the frame, an upper bound.
+const BYTES: u64 = 250;
+
+/// Tolerance of features, in standard deviations.
+const FEATURE: f32 = 0.6;
+
+/// Share of the mean variance around it that a colour's variance is raised to.
+const FLOOR: f32 = 0.5;
+
+fn make(parameters: &Parameters) -> Result<Box<dyn Reconstruction>> {
+    Ok(Box::new(Nlm {
+        features: parameters.switch("features")?,
+        settings: Settings {
+            window: parameters.get("window", "a number from 1 to 12", |window| (1..=12).contains(window))?,
+            patch: parameters.get("patch", "a number from 0 to 4", |patch| (0..=4).contains(patch))?,
+            color: parameters.get("k", "a number in [0.01, 100]", |k| (0.01..=100.0).contains(k))?,
+            feature: None,
+        },
+    }))
+}
+
+struct Nlm {
+    features: bool,
+    settings: Settings,
+}
+
+impl Reconstruction for Nlm {
+    fn needs(&self) -> Needs {
+        Needs { features: self.features, ..Needs::default() }
+    }
+
+    fn reconstruct(&self, frame: &Frame, context: &Context) -> Result<Solution> {
+        let inputs = Inputs::new(frame, 1)?;
+        inputs.check_memory(context, METHOD.id, BYTES)?;
+        let [color, variance] = inputs.color()?;
+        let mut features = Vec::new();
+        if self.features {
+            for kind in [Kind::Albedo, Kind::Normal] {
+                features.push(Feature::of(kind, &inputs)?.guide());
+            }
+        }
+        let guide = Guide { mean: color.clone(), variance: raise(&variance.sum(), FLOOR), tolerance: None };
+        let settings = Settings { feature: self.features.then_some(FEATURE), ..self.settings };
+        let filtered = nl_means::filter(&color, &Guides { color: guide, features }, settings);
+        let image = filtered.to_image(frame.width, frame.height, 1.0 / inputs.scale);
+        Ok(Solution { image, error: None, notes: Vec::new() })
+    }
+}

@@ -1,0 +1,61 @@
+//! Robust denoising using feature and colour information (Rousselle et al. 2013) by itself. It needs no gradients.
+
+use super::features::{Feature, Kind};
+use super::inputs::{Inputs, raise};
+use super::{Context, Method, Parameter, Parameters, Reconstruction, Solution};
+use crate::error::Result;
+use crate::film::{Frame, Needs};
+use crate::image::nl_means::rdfc::{self, Denoised, Options};
+use crate::image::nl_means::{Guide, Guides};
+use crate::image::planes::Planes;
+
+/// `rdfc`.
+pub const METHOD: Method = Method {
+    id: "rdfc",
+    summary: "three non-local means by colour and features, the best at each pixel; path tracing only, consistent",
+    parameters: &[
+        Parameter { name: "window", default: "10", summary: "radius of the window, 1 to 12 pixels" },
+        Parameter { name: "choice", default: "5", summary: "radius that the choice is smoothed over, 1 to 12 pixels" },
+    ],
+    make,
+};
+
+/// Bytes held for every pixel besides the frame, an upper bound.
+const BYTES: u64 = 400;
+
+/// Share of the mean variance around it that a colour's variance is raised to.
+const FLOOR: f32 = 0.5;
+
+fn make(parameters: &Parameters) -> Result<Box<dyn Reconstruction>> {
+    let radius = |name| parameters.get(name, "a number from 1 to 12", |radius| (1..=12).contains(radius));
+    Ok(Box::new(Rdfc { window: radius("window")?, choice: radius("choice")? }))
+}
+
+struct Rdfc {
+    window: usize,
+    choice: usize,
+}
+
+impl Reconstruction for Rdfc {
+    fn needs(&self) -> Needs {
+        Needs { features: true, ..Needs::default() }
+    }
+
+    fn reconstruct(&self, frame: &Frame, context: &Context) -> Result<Solution> {
+        let inputs = Inputs::new(frame, 1)?;
+        inputs.check_memory(context, METHOD.id, BYTES)?;
+        let [mean, variance] = inputs.color()?;
+        let features = [Feature::of(Kind::Albedo, &inputs)?.guide(), Feature::of(Kind::Normal, &inputs)?.guide()];
+        let color = Guide { mean, variance: raise(&variance.sum(), FLOOR), tolerance: None };
+        let options = Options { window: self.window, symmetric: false, choice: self.choice, rows: frame.height };
+        let report = |share| (context.progress)("denoise", share);
+        let Denoised { image, error } = rdfc::denoise(&Guides { color, features: features.into() }, options, &report);
+        let per_channel = |_, x: usize, y: usize| error.at(0, x as isize, y as isize).max(0.0);
+        let error = Planes::from_fn(frame.width, frame.height, 3, per_channel);
+        Ok(Solution {
+            image: image.to_image(frame.width, frame.height, 1.0 / inputs.scale),
+            error: Some(error.to_image(frame.width, frame.height, 1.0 / (inputs.scale * inputs.scale))),
+            notes: Vec::new(),
+        })
+    }
+}

@@ -1,0 +1,236 @@
+//! References: path-traced images of many samples with what is known of their own noise, as EXR files that can be
+//! worked on again and again.
+
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+
+use crate::error::{Error, Result};
+use crate::film::{Film, Layer, Needs};
+use crate::image::Image;
+use crate::image::io::{Kind, Pixels, read, write};
+use crate::math::rng;
+use crate::render::gradient::shift::Shift;
+use crate::render::{Budget, Control, Settings, render};
+use crate::scene::Scene;
+
+/// Seed of references, far from those that people choose.
+pub const SEED: u64 = 0x5eed_0000_0001;
+
+/// Samples per pixel that are rendered between two writes of the file, half of them in each half.
+pub const WAVE: u32 = 256;
+
+/// Channels in files: radiance, directly seen emitters included; the standard error of each value (variances themselves
+/// would be too small for half floats); and the first half less the second.
+const CHANNELS: [&str; 9] =
+    ["R", "G", "B", "sigma.R", "sigma.G", "sigma.B", "difference.R", "difference.G", "difference.B"];
+
+/// Largest half float.
+const HALF_MAX: f32 = 65504.0;
+
+/// A reference image: the mean of two halves whose samples are independent of each other. Within a half they go on from
+/// wave to wave, so that many short waves are as good as a long one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Reference {
+    /// Radiance, directly seen emitters included.
+    pub image: Image,
+    /// Variance of each value of `image`, from its samples. It takes no account of how evenly they are spread.
+    pub variance: Image,
+    /// The first half less the second.
+    pub difference: Image,
+    /// Samples per pixel, of both halves.
+    pub spp: u32,
+    /// Seed of the first half.
+    pub seed: u64,
+    /// Seconds it took to render.
+    pub seconds: f64,
+    /// The scene's, in hexadecimal.
+    pub fingerprint: String,
+}
+
+impl Reference {
+    /// A reference without samples.
+    pub fn new(scene: &Scene, seed: u64) -> Self {
+        let black = Image::new(scene.sensor().width, scene.sensor().height, 3);
+        Self {
+            image: black.clone(),
+            variance: black.clone(),
+            difference: black,
+            spp: 0,
+            seed,
+            seconds: 0.0,
+            fingerprint: fingerprint(scene),
+        }
+    }
+
+    /// Expected relMSE of the image itself against the true one, from the difference of the halves.
+    pub fn floor(&self) -> f64 {
+        if self.spp == 0 {
+            return f64::INFINITY;
+        }
+        let relative = |(&value, &difference): (&f32, &f32)| {
+            let (value, half) = (f64::from(value), f64::from(difference) / 2.0);
+            half * half / (value * value + 0.01)
+        };
+        let pairs = self.image.data.iter().zip(&self.difference.data);
+        pairs.map(relative).sum::<f64>() / self.image.data.len() as f64
+    }
+
+    /// Renders the next wave, `spp` samples in each half. Nothing changes when `control.stop` ends it early; then
+    /// this is false.
+    pub fn add_wave(&mut self, scene: &Scene, spp: u32, control: &Control) -> Result<bool> {
+        let mut halves = Vec::new();
+        for (k, seed) in [self.seed, rng::mix(self.seed)].into_iter().enumerate() {
+            let progress = |share: f32| (control.progress)(0.5 * (k as f32 + share));
+            let control = Control { stop: control.stop, progress: &progress };
+            let (budget, first, needs) = (Budget::Spp(spp), self.spp / 2, Needs::default());
+            let outcome = render(scene, Settings { budget, seed, first, needs, shift: Shift::default() }, &control);
+            if outcome.stopped {
+                return Ok(false);
+            }
+            self.seconds += outcome.elapsed.as_secs_f64();
+            halves.push(image_and_variance(&outcome.film)?);
+        }
+        self.merge(&halves[0], &halves[1], spp);
+        Ok(true)
+    }
+
+    /// Adds a mean and its variance of `spp` samples to each half.
+    fn merge(&mut self, a: &(Image, Image), b: &(Image, Image), spp: u32) {
+        let (n, m) = (f64::from(self.spp), 2.0 * f64::from(spp));
+        let share = m / (n + m);
+        for i in 0..self.image.data.len() {
+            let at = |image: &Image| f64::from(image.data[i]);
+            let (new, old) = (0.5 * (at(&a.0) + at(&b.0)), at(&self.image));
+            let difference = at(&self.difference);
+            let new_difference = at(&a.0) - at(&b.0);
+            // Sums of squared deviations: of what there was, of both halves, and between all of them.
+            let squares = |variance: f64, n: f64| variance * n * (n - 1.0).max(0.0);
+            let within = squares(at(&self.variance), n) + squares(at(&a.1), m / 2.0) + squares(at(&b.1), m / 2.0);
+            let between = 0.25 * new_difference * new_difference * m + (new - old) * (new - old) * n * share;
+            self.variance.data[i] = ((within + between) / ((n + m) * (n + m - 1.0))) as f32;
+            self.image.data[i] = (old + share * (new - old)) as f32;
+            self.difference.data[i] = (difference + share * (new_difference - difference)) as f32;
+        }
+        self.spp += 2 * spp;
+    }
+
+    /// Fails if the reference is not of this scene.
+    pub fn check(&self, path: &Path, scene: &Scene) -> Result<()> {
+        let other = fingerprint(scene);
+        if self.fingerprint != other {
+            let what = format!(
+                "is the reference of another scene or of an older version of it (fingerprint {}, the scene has \
+                 {other}); `fluxion reference` makes one",
+                self.fingerprint
+            );
+            return Err(Error::io(path, what));
+        }
+        Ok(())
+    }
+
+    /// Writes it as half floats or as floats. The file is replaced at once: there is never half of one.
+    pub fn save(&self, path: &Path, half: bool) -> Result<()> {
+        let mut data = Vec::with_capacity(self.image.data.len() * 3);
+        for pixel in (0..self.image.data.len()).step_by(3) {
+            let rgb = |image: &Image| [image.data[pixel], image.data[pixel + 1], image.data[pixel + 2]];
+            data.extend(rgb(&self.image));
+            data.extend(rgb(&self.variance).map(f32::sqrt));
+            data.extend(rgb(&self.difference));
+        }
+        if half && data.iter().any(|value| value.abs() > HALF_MAX) {
+            return Err(Error::io(
+                path,
+                format!("values above {HALF_MAX} do not fit into half floats: leave out --half"),
+            ));
+        }
+        let attribute = |name: &str, value: String| (format!("fluxion:{name}"), value);
+        let attributes = vec![
+            attribute("version", env!("CARGO_PKG_VERSION").into()),
+            attribute("method", "primal".into()),
+            attribute("fingerprint", self.fingerprint.clone()),
+            attribute("seed", self.seed.to_string()),
+            attribute("spp", self.spp.to_string()),
+            attribute("seconds", format!("{:.3}", self.seconds)),
+            attribute("floor", format!("{:.3e}", self.floor())),
+        ];
+        let channels = CHANNELS.map(String::from).to_vec();
+        let (width, height) = (self.image.width, self.image.height);
+        let pixels = Pixels { width, height, channels, data, eight_bit: false, attributes };
+        let part = path.with_extension("part.exr");
+        write(&part, &pixels, if half { Kind::Half } else { Kind::Float }, Some("zip"))?;
+        std::fs::rename(&part, path).map_err(|error| Error::io(path, error))
+    }
+
+    /// Whether a file was written by [`Reference::save`].
+    pub fn is_one(path: &Path) -> Result<bool> {
+        let pixels = read(path, &["fluxion:floor"])?;
+        Ok(pixels.attributes.iter().any(|(_, value)| !value.is_empty()))
+    }
+
+    /// Reads one that [`Reference::save`] wrote.
+    pub fn load(path: &Path) -> Result<Self> {
+        const NAMES: [&str; 4] = ["fingerprint", "seed", "spp", "seconds"];
+        let keys = NAMES.map(|name| format!("fluxion:{name}"));
+        let pixels = read(path, &keys.each_ref().map(String::as_str))?;
+        let attribute = |name: &str| {
+            let found = pixels.attributes.iter().find(|(key, _)| key.strip_prefix("fluxion:") == Some(name));
+            found.map(|(_, value)| value.as_str()).filter(|value| !value.is_empty())
+        };
+        let number = |name: &str| {
+            let parsed = attribute(name).and_then(|text| text.parse::<f64>().ok()).filter(|value| *value >= 0.0);
+            parsed.ok_or_else(|| not_one(path, &format!("its header has no number `fluxion:{name}`")))
+        };
+        let positions = CHANNELS.map(|name| pixels.channels.iter().position(|other| other == name));
+        let Some(positions) = positions.into_iter().collect::<Option<Vec<_>>>() else {
+            return Err(not_one(path, &format!("it lacks some of the channels {}", CHANNELS.join(", "))));
+        };
+        let channels = |positions: &[usize]| {
+            let samples = pixels.data.chunks_exact(pixels.channels.len());
+            let data = samples.flat_map(|pixel| positions.iter().map(|&at| pixel[at])).collect();
+            Image { width: pixels.width, height: pixels.height, channels: 3, data }
+        };
+        let [image, mut variance, difference] = [0, 3, 6].map(|first| channels(&positions[first..first + 3]));
+        for (what, image) in [("value", &image), ("standard error", &variance), ("difference", &difference)] {
+            if let Some(at) = image.data.iter().position(|value| !value.is_finite()) {
+                let (x, y) = (at / 3 % image.width, at / 3 / image.width);
+                return Err(Error::io(path, format!("the {what} at pixel {x},{y} is not finite")));
+            }
+        }
+        variance.data.iter_mut().for_each(|sigma| *sigma *= *sigma);
+        Ok(Self {
+            image,
+            variance,
+            difference,
+            spp: number("spp")? as u32,
+            // Through text: a float does not hold every seed.
+            seed: attribute("seed").and_then(|text| text.parse().ok()).unwrap_or_default(),
+            seconds: number("seconds")?,
+            fingerprint: attribute("fingerprint").unwrap_or_default().to_owned(),
+        })
+    }
+}
+
+fn not_one(path: &Path, why: &str) -> Error {
+    Error::io(path, format!("is no reference made by `fluxion reference`: {why}"))
+}
+
+/// The scene's fingerprint as it stands in headers.
+pub fn fingerprint(scene: &Scene) -> String {
+    format!("{:016x}", scene.fingerprint())
+}
+
+/// Radiance with directly seen emitters, and its variance.
+pub fn image_and_variance(film: &Film) -> Result<(Image, Image)> {
+    let frame = film.develop();
+    let sum = |a, b| {
+        let mut image = frame.require(a)?.clone();
+        image.add(frame.require(b)?);
+        Ok::<_, Error>(image)
+    };
+    Ok((sum(Layer::Color, Layer::Direct)?, sum(Layer::ColorVariance, Layer::DirectVariance)?))
+}
+
+/// A control that neither stops nor reports.
+pub fn silently<T>(work: impl FnOnce(&Control) -> T) -> T {
+    work(&Control { stop: &AtomicBool::new(false), progress: &|_| {} })
+}

@@ -1,0 +1,11 @@
+//! Reports of results and images: one HTML page that needs nothing else, and a table for terminals.
+
+mod changes;
+mod page;
+mod picture;
+mod summary;
+
+pub use self::changes::{Change, changes};
+pub use self::page::{Page, Shown, View};
+pub use self::picture::heat;
+pub use self::summary::{Row, Summary, table};

@@ -1,0 +1,229 @@
+//! Figures over all scenes: how much better a method is than path tracing, and how fast it gets better.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use crate::bench::{Record, Results};
+
+/// The method that others are compared with.
+pub const BASE: &str = "primal";
+
+/// A method's error on a scene within a budget: all seeds.
+#[derive(Clone, Debug, Serialize)]
+pub struct Point {
+    /// Name of the scene.
+    pub scene: String,
+    /// The method with its parameters.
+    pub method: String,
+    /// What was to be used up.
+    pub budget: String,
+    /// Seconds that were, mean over the seeds.
+    pub seconds: f64,
+    /// Samples per pixel, mean over the seeds.
+    pub spp: f64,
+    /// Error of every seed.
+    pub errors: Vec<f64>,
+}
+
+impl Point {
+    /// Mean over the seeds.
+    pub fn error(&self) -> f64 {
+        self.errors.iter().sum::<f64>() / self.errors.len() as f64
+    }
+}
+
+/// A method's figures.
+#[derive(Clone, Debug, Serialize)]
+pub struct Row {
+    /// The method with its parameters.
+    pub method: String,
+    /// Geometric mean of its error over path tracing's, over scenes and budgets.
+    pub ratio: Option<f64>,
+    /// Geometric mean over scenes of the time that path tracing would take, by its own line through its errors, for the
+    /// error that the method has at its largest budget, over the method's time.
+    pub speedup: Option<f64>,
+    /// Median over scenes of the slope of error over time, both as logarithms; -1 halves the error in twice the time.
+    pub slope: Option<f64>,
+    /// Scenes and budgets where no other method has less error.
+    pub wins: usize,
+    /// Scenes and budgets where it was run.
+    pub runs: usize,
+}
+
+/// The figures of one metric.
+#[derive(Clone, Debug, Serialize)]
+pub struct Summary {
+    /// Every method, that with the least error first.
+    pub rows: Vec<Row>,
+    /// What they are made from.
+    pub points: Vec<Point>,
+}
+
+impl Summary {
+    /// Summarises a metric of the results.
+    pub fn new(results: &Results, metric: &str) -> Self {
+        let points = points(results, metric);
+        let mut methods: Vec<&str> = Vec::new();
+        for point in &points {
+            if !methods.contains(&point.method.as_str()) {
+                methods.push(&point.method);
+            }
+        }
+        let mut rows: Vec<Row> = methods.into_iter().map(|method| row(&points, method)).collect();
+        let rank = |row: &Row| row.ratio.unwrap_or(f64::INFINITY);
+        rows.sort_by(|a, b| rank(a).total_cmp(&rank(b)));
+        Self { rows, points }
+    }
+}
+
+fn points(results: &Results, metric: &str) -> Vec<Point> {
+    let mut points: Vec<Point> = Vec::new();
+    let mut counts: Vec<f64> = Vec::new();
+    for record in &results.records {
+        let Record { scene, method, budget, .. } = record;
+        let Some(&error) = record.metrics.get(metric) else { continue };
+        let same = |point: &Point| point.scene == *scene && point.method == *method && point.budget == *budget;
+        let at = points.iter().position(same).unwrap_or_else(|| {
+            let (scene, method, budget) = (scene.clone(), method.clone(), budget.clone());
+            points.push(Point { scene, method, budget, seconds: 0.0, spp: 0.0, errors: Vec::new() });
+            counts.push(0.0);
+            points.len() - 1
+        });
+        counts[at] += 1.0;
+        let point = &mut points[at];
+        point.seconds += (record.seconds.total - point.seconds) / counts[at];
+        point.spp += (f64::from(record.spp) - point.spp) / counts[at];
+        point.errors.push(error);
+    }
+    points
+}
+
+fn row(points: &[Point], method: &str) -> Row {
+    let own: Vec<&Point> = points.iter().filter(|point| point.method == method).collect();
+    let of_base = |scene: &str| {
+        let base = points.iter().filter(|point| point.method == BASE && point.scene == scene);
+        base.map(|point| (point.seconds.ln(), point.error().ln())).collect::<Vec<_>>()
+    };
+    let ratios = own.iter().filter_map(|point| {
+        let same = |base: &&Point| base.method == BASE && base.scene == point.scene && base.budget == point.budget;
+        Some((point.error() / points.iter().find(same)?.error()).ln())
+    });
+    let mut scenes: BTreeMap<&str, Vec<&Point>> = BTreeMap::new();
+    own.iter().for_each(|point| scenes.entry(&point.scene).or_default().push(point));
+    let mut slopes: Vec<f64> = scenes
+        .values()
+        .filter_map(|points| {
+            let points: Vec<_> = points.iter().map(|point| (point.seconds.ln(), point.error().ln())).collect();
+            line(&points).map(|(_, slope)| slope)
+        })
+        .collect();
+    slopes.sort_by(f64::total_cmp);
+    let speedups = scenes.iter().filter_map(|(scene, points)| {
+        let last = points.iter().max_by(|a, b| a.seconds.total_cmp(&b.seconds))?;
+        let (start, slope) = line(&of_base(scene)).filter(|(_, slope)| *slope < -0.1)?;
+        Some((last.error().ln() - start) / slope - last.seconds.ln())
+    });
+    let best = |point: &&&Point| {
+        let rivals = points.iter().filter(|rival| rival.scene == point.scene && rival.budget == point.budget);
+        rivals.map(Point::error).fold(f64::INFINITY, f64::min) >= point.error()
+    };
+    Row {
+        method: method.to_owned(),
+        ratio: geometric_mean(ratios),
+        speedup: geometric_mean(speedups),
+        slope: slopes.get(slopes.len() / 2).copied(),
+        wins: own.iter().filter(best).count(),
+        runs: own.len(),
+    }
+}
+
+/// The exponential of the mean; none of nothing and of what is not finite.
+fn geometric_mean(logarithms: impl Iterator<Item = f64>) -> Option<f64> {
+    let all: Vec<f64> = logarithms.collect();
+    let mean = (all.iter().sum::<f64>() / all.len() as f64).exp();
+    Some(mean).filter(|mean| mean.is_finite() && *mean > 0.0)
+}
+
+/// Least squares line through points: value at zero, and slope. None without two different abscissae.
+fn line(points: &[(f64, f64)]) -> Option<(f64, f64)> {
+    let n = points.len() as f64;
+    let (mx, my) = points.iter().fold((0.0, 0.0), |(x, y), point| (x + point.0 / n, y + point.1 / n));
+    let (xx, xy) = points.iter().fold((0.0, 0.0), |(xx, xy), point| {
+        let (x, y) = (point.0 - mx, point.1 - my);
+        (xx + x * x, xy + x * y)
+    });
+    let slope = xy / xx;
+    (xx > 1e-12 && slope.is_finite()).then_some((my - slope * mx, slope))
+}
+
+/// The summary as a Markdown table.
+pub fn table(summary: &Summary) -> String {
+    let number = |value: Option<f64>, digits: usize| value.map_or("-".into(), |value| format!("{value:.digits$}"));
+    let mut text =
+        String::from("| method | error over primal's | speed-up | slope | wins | of |\n|---|---|---|---|---|---|\n");
+    for Row { method, ratio, speedup, slope, wins, runs } in &summary.rows {
+        let (ratio, speedup, slope) = (number(*ratio, 3), number(*speedup, 1), number(*slope, 2));
+        text += &format!("| {method} | {ratio} | {speedup} | {slope} | {wins} | {runs} |\n");
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bench::Seconds;
+
+    /// Errors of `scale / t^power` at 1, 2 and 4 seconds, with the seeds apart by a factor of 1.1 each way.
+    fn results(methods: &[(&str, f64, f64)]) -> Results {
+        let mut results = Results::default();
+        for (method, scale, power) in methods {
+            for (k, t) in [1.0, 2.0, 4.0f64].into_iter().enumerate() {
+                for seed in [1, 2] {
+                    let error = scale / t.powf(*power) * if seed == 1 { 0.9 } else { 1.1 };
+                    results.records.push(Record {
+                        scene: "room".into(),
+                        method: (*method).into(),
+                        budget: format!("{}s", 1 << k),
+                        seed,
+                        width: 1,
+                        height: 1,
+                        fingerprint: String::new(),
+                        spp: 1,
+                        seconds: Seconds { total: t, ..Seconds::default() },
+                        metrics: [("relmse".to_owned(), error)].into(),
+                        negative: 0.0,
+                        rejected: 0,
+                        peak_bytes: 0,
+                        floor: None,
+                        machine: String::new(),
+                        version: String::new(),
+                    });
+                }
+            }
+        }
+        results
+    }
+
+    #[test]
+    fn figures_are_those_of_exact_power_laws() {
+        let summary = Summary::new(&results(&[("primal", 1.0, 1.0), ("good", 0.1, 1.0), ("slow", 0.3, 0.5)]), "relmse");
+        let row = |k: usize| &summary.rows[[2, 0, 1][k]];
+        let close = |value: Option<f64>, expected: f64| (value.unwrap() - expected).abs() < 1e-9;
+        assert!(close(row(0).ratio, 1.0) && close(row(0).slope, -1.0) && close(row(0).speedup, 1.0));
+        assert!(close(row(1).ratio, 0.1) && close(row(1).slope, -1.0) && close(row(1).speedup, 10.0));
+        // 0.3 sqrt(t) over path tracing: the geometric mean is at t = 2.
+        assert!(close(row(2).ratio, 0.3 * 2f64.sqrt()) && close(row(2).slope, -0.5));
+        assert!(close(row(2).speedup, 1.0 / (0.3 / 2.0) / 4.0));
+        assert_eq!((row(0).wins, row(1).wins, row(2).wins), (0, 3, 0));
+        assert!(table(&summary).contains("| good | 0.100 | 10.0 | -1.00 | 3 | 3 |"));
+    }
+
+    #[test]
+    fn a_single_budget_has_no_slope() {
+        let mut few = results(&[("primal", 1.0, 1.0)]);
+        few.records.truncate(2);
+        let summary = Summary::new(&few, "relmse");
+        assert_eq!((summary.rows[0].slope, summary.rows[0].speedup), (None, None));
+    }
+}
