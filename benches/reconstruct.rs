@@ -14,7 +14,7 @@ use fluxion::reconstruct::{Context, parse, solve};
 
 const RUNS: usize = 5;
 
-const LAYERS: [Layer; 11] = [
+const LAYERS: [Layer; 13] = [
     Layer::Color,
     Layer::ColorVariance,
     Layer::Dx,
@@ -25,6 +25,8 @@ const LAYERS: [Layer; 11] = [
     Layer::AlbedoVariance,
     Layer::Normal,
     Layer::NormalVariance,
+    Layer::Depth,
+    Layer::DepthVariance,
     Layer::Samples,
 ];
 
@@ -64,7 +66,8 @@ fn stages(method: &str, frame: &Frame) -> Vec<(String, f64)> {
     let marks = RefCell::new(vec![("begin".to_owned(), Instant::now())]);
     let progress = |what: &str, _: f32| marks.borrow_mut().push((what.to_owned(), Instant::now()));
     let made = parse(method).expect("a method");
-    solve(made.as_ref(), frame, &Context { progress: &progress, memory: None, notes: false }).expect("an image");
+    let solved = solve(made.as_ref(), frame, &Context { progress: &progress, memory: None, notes: false });
+    solved.unwrap_or_else(|error| panic!("{error}"));
     progress("end", 1.0);
     let mut stages: Vec<(String, f64)> = Vec::new();
     for pair in marks.into_inner().windows(2) {
@@ -80,8 +83,7 @@ fn stages(method: &str, frame: &Frame) -> Vec<(String, f64)> {
 
 fn repeated(source: &Frame, width: usize, height: usize) -> Frame {
     let mut frame = Frame::new(width, height);
-    for layer in LAYERS {
-        let from = source.get(layer).expect("a layer that frgr needs");
+    for (layer, from) in source.present() {
         let mut image = Image::new(width, height, from.channels);
         for (i, pixel) in image.data.chunks_exact_mut(from.channels).enumerate() {
             pixel.copy_from_slice(from.pixel(i % width % from.width, i / width % from.height));
@@ -108,6 +110,7 @@ fn noise() -> Frame {
                 Layer::ColorVariance => 1.0 / 12.0,
                 Layer::DxVariance | Layer::DyVariance => 0.09 / 12.0,
                 Layer::Samples => 16.0,
+                Layer::Depth => 3.0,
                 _ => 0.0,
             };
         }

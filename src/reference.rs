@@ -7,7 +7,7 @@ use std::sync::atomic::AtomicBool;
 use crate::error::{Error, Result};
 use crate::film::{Film, Layer, Needs};
 use crate::image::Image;
-use crate::image::io::{Kind, Pixels, read, write};
+use crate::image::io::{ImageFile, Kind, Pixels, read, write};
 use crate::math::rng;
 use crate::render::gradient::shift::Shift;
 use crate::render::{Budget, Control, Settings, render};
@@ -15,9 +15,6 @@ use crate::scene::Scene;
 
 /// Seed of references, far from those that people choose.
 pub const SEED: u64 = 0x5eed_0000_0001;
-
-/// Samples per pixel that are rendered between two writes of the file, half of them in each half.
-pub const WAVE: u32 = 256;
 
 /// Channels in files: radiance, directly seen emitters included; the standard error of each value (variances themselves
 /// would be too small for half floats); and the first half less the second.
@@ -78,8 +75,8 @@ impl Reference {
     /// Renders the next wave, `spp` samples in each half. Nothing changes when `control.stop` ends it early; then
     /// this is false.
     pub fn add_wave(&mut self, scene: &Scene, spp: u32, control: &Control) -> Result<bool> {
-        let mut halves = Vec::new();
-        for (k, seed) in [self.seed, rng::mix(self.seed)].into_iter().enumerate() {
+        let (mut halves, mut seconds) = (Vec::new(), 0.0);
+        for (k, seed) in [self.seed, rng::combine(self.seed, 1)].into_iter().enumerate() {
             let progress = |share: f32| (control.progress)(0.5 * (k as f32 + share));
             let control = Control { stop: control.stop, progress: &progress };
             let (budget, first, needs) = (Budget::Spp(spp), self.spp / 2, Needs::default());
@@ -87,10 +84,11 @@ impl Reference {
             if outcome.stopped {
                 return Ok(false);
             }
-            self.seconds += outcome.elapsed.as_secs_f64();
+            seconds += outcome.elapsed.as_secs_f64();
             halves.push(image_and_variance(&outcome.film)?);
         }
         self.merge(&halves[0], &halves[1], spp);
+        self.seconds += seconds;
         Ok(true)
     }
 
@@ -128,7 +126,13 @@ impl Reference {
         Ok(())
     }
 
-    /// Writes it as half floats or as floats. The file is replaced at once: there is never half of one.
+    /// Whether every value is one that half floats have room for.
+    pub fn fits_half(&self) -> bool {
+        self.image.data.iter().chain(&self.difference.data).all(|value| value.abs() <= HALF_MAX)
+            && self.variance.data.iter().all(|variance| variance.sqrt() <= HALF_MAX)
+    }
+
+    /// Writes it as half floats, if it fits, or as floats. The file is replaced at once: there is never half of one.
     pub fn save(&self, path: &Path, half: bool) -> Result<()> {
         let mut data = Vec::with_capacity(self.image.data.len() * 3);
         for pixel in (0..self.image.data.len()).step_by(3) {
@@ -136,12 +140,6 @@ impl Reference {
             data.extend(rgb(&self.image));
             data.extend(rgb(&self.variance).map(f32::sqrt));
             data.extend(rgb(&self.difference));
-        }
-        if half && data.iter().any(|value| value.abs() > HALF_MAX) {
-            return Err(Error::io(
-                path,
-                format!("values above {HALF_MAX} do not fit into half floats: leave out --half"),
-            ));
         }
         let attribute = |name: &str, value: String| (format!("fluxion:{name}"), value);
         let attributes = vec![
@@ -157,14 +155,13 @@ impl Reference {
         let (width, height) = (self.image.width, self.image.height);
         let pixels = Pixels { width, height, channels, data, eight_bit: false, attributes };
         let part = path.with_extension("part.exr");
-        write(&part, &pixels, if half { Kind::Half } else { Kind::Float }, Some("zip"))?;
+        write(&part, &pixels, if half && self.fits_half() { Kind::Half } else { Kind::Float }, Some("zip"))?;
         std::fs::rename(&part, path).map_err(|error| Error::io(path, error))
     }
 
     /// Whether a file was written by [`Reference::save`].
     pub fn is_one(path: &Path) -> Result<bool> {
-        let pixels = read(path, &["fluxion:floor"])?;
-        Ok(pixels.attributes.iter().any(|(_, value)| !value.is_empty()))
+        Ok(ImageFile::open(path)?.attribute("fluxion:floor").is_some())
     }
 
     /// Reads one that [`Reference::save`] wrote.
@@ -176,10 +173,10 @@ impl Reference {
             let found = pixels.attributes.iter().find(|(key, _)| key.strip_prefix("fluxion:") == Some(name));
             found.map(|(_, value)| value.as_str()).filter(|value| !value.is_empty())
         };
-        let number = |name: &str| {
-            let parsed = attribute(name).and_then(|text| text.parse::<f64>().ok()).filter(|value| *value >= 0.0);
-            parsed.ok_or_else(|| not_one(path, &format!("its header has no number `fluxion:{name}`")))
-        };
+        let lacks = |name: &str| not_one(path, &format!("its header has no sensible `fluxion:{name}`"));
+        let spp = attribute("spp").and_then(|text| text.parse::<u32>().ok()).filter(|spp| *spp > 0 && spp % 2 == 0);
+        let seconds = attribute("seconds").and_then(|text| text.parse::<f64>().ok()).filter(|s| (0.0..1e9).contains(s));
+        let seed = attribute("seed").and_then(|text| text.parse().ok());
         let positions = CHANNELS.map(|name| pixels.channels.iter().position(|other| other == name));
         let Some(positions) = positions.into_iter().collect::<Option<Vec<_>>>() else {
             return Err(not_one(path, &format!("it lacks some of the channels {}", CHANNELS.join(", "))));
@@ -201,11 +198,10 @@ impl Reference {
             image,
             variance,
             difference,
-            spp: number("spp")? as u32,
-            // Through text: a float does not hold every seed.
-            seed: attribute("seed").and_then(|text| text.parse().ok()).unwrap_or_default(),
-            seconds: number("seconds")?,
-            fingerprint: attribute("fingerprint").unwrap_or_default().to_owned(),
+            spp: spp.ok_or_else(|| lacks("spp"))?,
+            seed: seed.ok_or_else(|| lacks("seed"))?,
+            seconds: seconds.ok_or_else(|| lacks("seconds"))?,
+            fingerprint: attribute("fingerprint").ok_or_else(|| lacks("fingerprint"))?.to_owned(),
         })
     }
 }

@@ -82,21 +82,47 @@ fn references_are_gone_on_with_and_never_mixed_up() {
     for (more, expected) in [
         (vec!["--size", "16x12", "--spp", "8"], "has 16x16 pixels, not 16x12"),
         (vec!["--size", "16x16", "--spp", "48", "--seed", "3"], "was begun with --seed"),
-        (vec!["--size", "16x16", "--spp", "48", "-D", "nosuch=1"], "is the reference of another scene"),
         (vec!["--size", "16x16"], "--target-floor"),
         (vec!["--size", "16x16", "--target-floor", "0"], "positive"),
+        (vec!["--size", "16x16", "--spp", "8", "-o", "r.png"], "cannot be used multiple times"),
     ] {
         let (code, _, errors) = go(&more);
-        // A definition that no <default> asks for leaves the scene as it is.
-        if more.contains(&"-D") {
-            assert_eq!(code, 0, "{errors}");
-        } else {
-            assert!(code != 0 && errors.contains(expected), "{more:?}: {errors}");
-        }
+        assert!(code != 0 && errors.contains(expected), "{more:?}: {errors}");
     }
+    let cornell = scene("cornell-box");
+    let (code, _, errors) = fluxion(folder.path(), &["reference", &cornell, "-o", "r.png", "--spp", "8"]);
+    assert!(code == 1 && errors.contains("ends in .exr"), "{errors}");
     let other = [&scene("glossy-metal"), "-o", "r.exr", "--size", "16x16", "--spp", "64"];
     let (code, _, errors) = fluxion(folder.path(), &[&["reference"], &other[..]].concat());
     assert!(code == 1 && errors.contains("r.exr: is the reference of another scene"), "{errors}");
+}
+
+#[test]
+fn definitions_make_another_scene() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = std::fs::read_to_string(scene("unit/diffuse")).unwrap();
+    let start = text.find("<scene").unwrap();
+    let (head, rest) = text.split_at(start + text[start..].find('>').unwrap() + 1);
+    let text = format!("{head}<default name=\"depth\" value=\"3\"/>{rest}");
+    let at = text.find("name=\"max_depth\" value=\"").expect("a depth") + "name=\"max_depth\" value=\"".len();
+    let end = at + text[at..].find('"').unwrap();
+    std::fs::write(folder.path().join("s.xml"), format!("{}$depth{}", &text[..at], &text[end..])).unwrap();
+    let go = |more: &[&str]| {
+        fluxion(folder.path(), &[&["reference", "s.xml", "-o", "r.exr", "-q", "--size", "8x8"], more].concat())
+    };
+    assert_eq!(go(&["--spp", "8", "-D", "depth=2"]).0, 0);
+    assert_eq!(go(&["--spp", "16", "-D", "depth=2", "-D", "nosuch=1"]).0, 0);
+    let (code, _, errors) = go(&["--spp", "32", "-D", "depth=4"]);
+    assert!(code == 1 && errors.contains("reference of another scene"), "{errors}");
+}
+
+#[test]
+fn a_seed_of_zero_has_two_halves() {
+    let folder = tempfile::tempdir().unwrap();
+    let cornell = scene("cornell-box");
+    let arguments = ["reference", &cornell, "-o", "r.exr", "-q", "--size", "8x8", "--spp", "8", "--seed", "0"];
+    succeed(folder.path(), &arguments);
+    assert!(Reference::load(&folder.path().join("r.exr")).unwrap().floor() > 0.0);
 }
 
 #[test]
@@ -118,6 +144,12 @@ fn a_benchmark_is_complete_after_every_run_and_goes_on() {
         assert!(record.metrics["relmse"] > 0.0 && record.floor.unwrap() > 0.0 && record.peak_bytes > 1 << 20);
         assert_eq!(record.budget, format!("{}spp", record.spp));
     }
+    let mut other = all.clone();
+    other.records[0].machine = "an abacus".into();
+    std::fs::write(folder.path().join("out/results.json"), other.json().unwrap()).unwrap();
+    let (code, _, errors) = fluxion(folder.path(), &[&arguments[..], &["--resume"]].concat());
+    assert!(code == 1 && errors.contains("another machine"), "{errors}");
+    std::fs::write(folder.path().join("out/results.json"), all.json().unwrap()).unwrap();
     // Without --resume nothing is written over; with it, only what is missing is run.
     let (code, _, errors) = fluxion(folder.path(), &arguments);
     assert!(code == 1 && errors.contains("--resume"), "{errors}");
@@ -182,6 +214,7 @@ fn mistakes_are_found_before_the_work() {
         (vec![&glossy, "--reference", "references", "--spp", "1", "-o", "o"], 1, "`fluxion reference` makes one"),
         (vec![&cornell, "--reference", "nan.exr", "--spp", "1", "-o", "o"], 1, "not finite"),
         (vec![&cornell, "--reference", "file", "--spp", "1", "-o", "o"], 1, "file"),
+        (vec![&cornell, &cornell, "--reference", "references", "--spp", "1", "-o", "o"], 2, "two scenes are called"),
         (vec!["references", "--spp", "1", "-o", "o"], 1, "neither a scene.xml"),
         (vec!["no.xml", "--spp", "1", "-o", "o"], 1, "no.xml"),
     ] {

@@ -85,7 +85,7 @@ fn figures_come_as_json_with_the_promised_keys() {
         assert_eq!(figures[key].as_f64(), Some(value), "{key}");
     }
     assert!(folder.path().join("map.png").is_file());
-    let arguments = ["compare", "a.exr", "a.exr", "a.exr", "--json", "all.json", "--html", "page.html"];
+    let arguments = ["compare", "a.exr", "a.exr", "a.exr", "--json=all.json", "--html", "page.html"];
     fluxion(folder.path()).args(arguments).assert().success();
     let all = std::fs::read_to_string(folder.path().join("all.json")).unwrap();
     let all: serde_json::Value = serde_json::from_str(&all).unwrap();
@@ -155,6 +155,7 @@ fn mistakes_are_told_apart_and_leave_nothing_behind() {
         (vec!["render", &cornell, "--replay", "5000,1,1"], 2, "outside the film"),
         (vec!["reconstruct", "cut.exr", "-o", "a.exr"], 1, "cut.exr"),
         (vec!["compare", "cut.exr", "cut.exr"], 1, "cut.exr"),
+        (vec!["compare", "bad.xml", "cut.exr", "--map", "cut.exr"], 1, "bad.xml"),
         (vec!["info"], 2, "scene file"),
     ] {
         let (found, text) = stderr(fluxion(folder.path()).args(&arguments));

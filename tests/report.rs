@@ -113,7 +113,14 @@ fn probe(folder: &Path, html: &str) -> Vec<(String, String)> {
     let watched = html.replacen("<meta", &format!("{WATCH}<meta"), 1);
     std::fs::write(&file, watched.replace("</body>", &format!("{PROBE}</body>"))).unwrap();
     let output = Command::new(chromium())
-        .args(["--headless", "--no-sandbox", "--disable-gpu", "--virtual-time-budget=4000", "--dump-dom"])
+        .args([
+            "--headless",
+            "--no-sandbox",
+            "--disable-gpu",
+            "--disable-dev-shm-usage",
+            "--virtual-time-budget=4000",
+            "--dump-dom",
+        ])
         .arg(format!("--user-data-dir={}", folder.join("profile").display()))
         .arg(format!("file://{}", file.display()))
         .output()

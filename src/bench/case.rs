@@ -34,20 +34,43 @@ impl Case {
     pub fn load(path: &Path, reference: Option<&Path>, size: Option<(usize, usize)>) -> Result<Self> {
         let name = name(path);
         let file = find(path, &name, reference)?;
-        let (truth, known) = truth(&file)?;
+        let truth = Truth::load(&file)?;
         let there = (truth.image.width, truth.image.height);
         let start = Instant::now();
-        let own = load::load(path, &load::Options { size: size.or(Some(there)), ..load::Options::default() })?;
+        let scene = load::load(path, &load::Options { size: size.or(Some(there)), ..load::Options::default() })?;
         let load = start.elapsed().as_secs_f64();
-        let wanted = (own.sensor().width, own.sensor().height);
+        let wanted = (scene.sensor().width, scene.sensor().height);
         if wanted != there {
             let what = format!("has {}x{} pixels, not {}x{}", there.0, there.1, wanted.0, wanted.1);
             return Err(Error::io(&file, what));
         }
-        if let Some(known) = known {
-            known.check(&file, &own)?;
+        if Reference::is_one(&file)? {
+            Reference::load(&file)?.check(&file, &scene)?;
         }
-        Ok(Self { name, scene: own, truth, load })
+        Ok(Self { name, scene, truth, load })
+    }
+}
+
+impl Truth {
+    /// The reference of a scene, as [`Case::load`] finds it, with the scene's name.
+    pub fn of(path: &Path, reference: Option<&Path>) -> Result<(String, Self)> {
+        let name = name(path);
+        let truth = Self::load(&find(path, &name, reference)?)?;
+        Ok((name, truth))
+    }
+
+    fn load(path: &Path) -> Result<Self> {
+        if Reference::is_one(path)? {
+            let reference = Reference::load(path)?;
+            let floor = Some(reference.floor());
+            return Ok(Self { image: reference.image, floor });
+        }
+        let image = io::read_color(path)?;
+        if let Some(at) = image.data.iter().position(|value| !value.is_finite()) {
+            let (x, y) = (at / 3 % image.width, at / 3 / image.width);
+            return Err(Error::io(path, format!("the value at pixel {x},{y} is not finite")));
+        }
+        Ok(Self { image, floor: None })
     }
 }
 
@@ -76,18 +99,4 @@ fn find(path: &Path, name: &str, reference: Option<&Path>) -> Result<PathBuf> {
         let what = format!("no reference at {}; `fluxion reference` makes one", places.join(", "));
         Error::io(path, what)
     })
-}
-
-/// The image of a file, and the whole reference if it is one of Fluxion's own.
-fn truth(path: &Path) -> Result<(Truth, Option<Reference>)> {
-    if !Reference::is_one(path)? {
-        let image = io::read_color(path)?;
-        if let Some(at) = image.data.iter().position(|value| !value.is_finite()) {
-            let (x, y) = (at / 3 % image.width, at / 3 / image.width);
-            return Err(Error::io(path, format!("the value at pixel {x},{y} is not finite")));
-        }
-        return Ok((Truth { image, floor: None }, None));
-    }
-    let reference = Reference::load(path)?;
-    Ok((Truth { image: reference.image.clone(), floor: Some(reference.floor()) }, Some(reference)))
 }

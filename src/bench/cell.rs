@@ -2,13 +2,12 @@
 
 use std::collections::BTreeMap;
 use std::fmt;
-use std::str::FromStr;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
 use super::case::Case;
 use super::record::{Record, Seconds, machine};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::film::{Frame, Needs};
 use crate::image::Image;
 use crate::math::rng;
@@ -28,23 +27,22 @@ pub enum Budget {
     Spp(u32),
 }
 
+impl Budget {
+    /// The number of seconds or samples.
+    pub fn amount(self) -> f64 {
+        match self {
+            Self::Seconds(seconds) => seconds,
+            Self::Spp(spp) => f64::from(spp),
+        }
+    }
+}
+
 impl fmt::Display for Budget {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Seconds(seconds) => write!(f, "{seconds}s"),
             Self::Spp(spp) => write!(f, "{spp}spp"),
         }
-    }
-}
-
-impl FromStr for Budget {
-    type Err = Error;
-
-    fn from_str(text: &str) -> Result<Self> {
-        let spp = text.strip_suffix("spp").and_then(|n| n.parse().ok()).filter(|&n| n > 0).map(Self::Spp);
-        let seconds = || text.strip_suffix('s').and_then(|n| n.parse().ok()).filter(|&n: &f64| n > 0.0 && n < 1e9);
-        spp.or_else(|| seconds().map(Self::Seconds))
-            .ok_or_else(|| Error::Usage(format!("`{text}` is no budget: write 5s or 64spp")))
     }
 }
 
@@ -85,9 +83,15 @@ impl<'a> Runner<'a> {
         Ok(Self { case, method, made, needs, lit })
     }
 
-    fn frame(&self, budget: render::Budget, seed: u64, seconds: &mut Seconds) -> (render::Outcome, Frame) {
+    fn frame(
+        &self,
+        budget: render::Budget,
+        seed: u64,
+        stop: &AtomicBool,
+        seconds: &mut Seconds,
+    ) -> (render::Outcome, Frame) {
         let settings = Settings { budget, seed, first: 0, needs: self.needs, shift: Shift::default() };
-        let outcome = render(&self.case.scene, settings, &Control { stop: &AtomicBool::new(false), progress: &|_| {} });
+        let outcome = render(&self.case.scene, settings, &Control { stop, progress: &|_| {} });
         seconds.render = outcome.elapsed.as_secs_f64();
         let start = Instant::now();
         let mut frame = outcome.film.develop();
@@ -109,7 +113,7 @@ impl<'a> Runner<'a> {
     /// Tries with two samples per pixel; the reconstruction twice, since the first may load libraries.
     pub fn pilot(&self) -> Result<Pilot> {
         let mut seconds = Seconds::default();
-        let (_, frame) = self.frame(render::Budget::Spp(2), 0, &mut seconds);
+        let (_, frame) = self.frame(render::Budget::Spp(2), 0, &AtomicBool::new(false), &mut seconds);
         self.finish(&frame, &mut seconds)?;
         let first = seconds.reconstruct;
         if first < 1.0 {
@@ -119,8 +123,9 @@ impl<'a> Runner<'a> {
         Ok(Pilot { sample: seconds.render / 2.0, finish })
     }
 
-    /// Runs with a seed, within a budget; `pilot` says how long the reconstruction is going to take.
-    pub fn run(&self, budget: Budget, seed: u64, pilot: Pilot) -> Result<Ran> {
+    /// Runs with a seed, within a budget; `pilot` says how long the reconstruction is going to take. None if `stop` was
+    /// set before the samples were taken.
+    pub fn run(&self, budget: Budget, seed: u64, pilot: Pilot, stop: &AtomicBool) -> Result<Option<Ran>> {
         reset_peak();
         let mut seconds = Seconds { load: self.case.load, ..Seconds::default() };
         let allowed = match budget {
@@ -129,13 +134,19 @@ impl<'a> Runner<'a> {
         };
         // Runs of different budgets do not share samples; those of different methods do.
         let salt = budget.to_string().bytes().fold(0, |hash, byte| rng::combine(hash, u64::from(byte)));
-        let (outcome, frame) = self.frame(allowed, rng::combine(seed, salt), &mut seconds);
+        let (outcome, frame) = self.frame(allowed, rng::combine(seed, salt), stop, &mut seconds);
+        if outcome.stopped {
+            return Ok(None);
+        }
         let image = self.finish(&frame, &mut seconds)?;
         seconds.total = seconds.render + seconds.develop + seconds.reconstruct;
         let peak_bytes = peak_bytes();
         let mut metrics = BTreeMap::new();
         for metric in METRICS {
-            metrics.insert(metric.id.to_owned(), metric.measure(&image, &self.case.truth.image)?.mean);
+            let mean = metric.measure(&image, &self.case.truth.image)?.mean;
+            if mean.is_finite() {
+                metrics.insert(metric.id.to_owned(), mean);
+            }
         }
         let negative = image.data.iter().filter(|&&value| value < 0.0).count() as f64 / image.data.len() as f64;
         let record = Record {
@@ -156,7 +167,7 @@ impl<'a> Runner<'a> {
             machine: machine(),
             version: env!("CARGO_PKG_VERSION").into(),
         };
-        Ok(Ran { record, image })
+        Ok(Some(Ran { record, image }))
     }
 }
 

@@ -43,7 +43,7 @@ pub struct Record {
     pub spp: u32,
     /// Time of the stages.
     pub seconds: Seconds,
-    /// Every metric by its name.
+    /// Every metric by its name, as far as it is finite.
     pub metrics: BTreeMap<String, f64>,
     /// Share of the image's values below zero.
     pub negative: f64,
@@ -59,14 +59,7 @@ pub struct Record {
     pub version: String,
 }
 
-impl Record {
-    /// Whether this is the run with that scene, method, budget and seed.
-    pub fn is(&self, scene: &str, method: &str, budget: &str, seed: u64) -> bool {
-        self.scene == scene && self.method == method && self.budget == budget && self.seed == seed
-    }
-}
-
-/// A run that was not worth starting.
+/// A run that was not worth starting, or failed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LeftOut {
     /// Name of the scene.
@@ -92,7 +85,8 @@ impl Results {
     /// Reads a file that [`Results::json`] was written to.
     pub fn load(path: &Path) -> Result<Self> {
         let text = std::fs::read_to_string(path).map_err(|error| Error::io(path, error))?;
-        serde_json::from_str(&text).map_err(|error| Error::io(path, format!("is no file of results: {error}")))
+        serde_json::from_str(&text)
+            .map_err(|error| Error::io(path, format!("is no file of results ({error}): move it away")))
     }
 
     /// All of it as JSON.

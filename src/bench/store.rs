@@ -1,10 +1,10 @@
-//! The folder of a benchmark: results, images and the page, complete after every run.
+//! The folder of a benchmark: results and images, complete after every run, and the page.
 
 use std::path::{Path, PathBuf};
 
 use super::case::Case;
-use super::cell::Ran;
-use super::record::Results;
+use super::cell::{Budget, Ran};
+use super::record::{LeftOut, Record, Results, machine};
 use crate::error::{Error, Result};
 use crate::image::{Image, io};
 use crate::reference::fingerprint;
@@ -33,18 +33,30 @@ impl Store {
         Ok(store)
     }
 
-    /// Whether a run is there. One of the same name on another scene or at another size is an error.
-    pub fn has(&self, case: &Case, method: &str, budget: &str, seed: u64) -> Result<bool> {
-        let Some(record) = self.results.records.iter().find(|record| record.is(&case.name, method, budget, seed))
-        else {
-            return Ok(false);
-        };
-        let size = (case.truth.image.width, case.truth.image.height);
-        if record.fingerprint != fingerprint(&case.scene) || (record.width, record.height) != size {
-            let what = format!("holds results of another version or size of {}: name another folder", case.name);
-            return Err(Error::io(&self.folder, what));
+    /// Whether a run is there.
+    pub fn has(&self, case: &Case, method: &str, budget: Budget, seed: u64) -> Result<bool> {
+        let budget = budget.to_string();
+        Ok(self.of(case)?.any(|record| record.method == method && record.budget == budget && record.seed == seed))
+    }
+
+    /// The runs on a scene. They must be of the same version of it, measured by the same reference on the same machine.
+    pub fn of<'a>(&'a self, case: &'a Case) -> Result<impl Iterator<Item = &'a Record>> {
+        let (size, floor) = ((case.truth.image.width, case.truth.image.height), case.truth.floor);
+        let (fingerprint, machine) = (fingerprint(&case.scene), machine());
+        let own = self.results.records.iter().filter(|record| record.scene == case.name);
+        for record in own.clone() {
+            let different = [
+                (record.fingerprint != fingerprint, "another version of the scene"),
+                ((record.width, record.height) != size, "another size"),
+                (record.floor != floor, "another reference"),
+                (record.machine != machine, "another machine or number of threads"),
+            ];
+            if let Some((_, what)) = different.into_iter().find(|(differs, _)| *differs) {
+                let what = format!("holds results on {} with {what}: name another folder", case.name);
+                return Err(Error::io(&self.folder, what));
+            }
         }
-        Ok(true)
+        Ok(own)
     }
 
     /// Writes the results.
@@ -56,16 +68,31 @@ impl Store {
     /// Adds a run. The images of the first seed are kept.
     pub fn add(&mut self, ran: Ran) -> Result<()> {
         let Ran { record, image } = ran;
-        if record.seed == 1 {
-            io::write_color(&self.image_file(&record.scene, &record.method, &record.budget), &image, None, &[])?;
-        }
+        let file = (record.seed == 1).then(|| self.image_file(&record.scene, &record.method, &record.budget));
+        let same = |left: &LeftOut| {
+            (&left.scene, &left.method, &left.budget) == (&record.scene, &record.method, &record.budget)
+        };
+        self.results.left_out.retain(|left| !same(left));
         self.results.records.push(record);
-        self.save()
+        self.save()?;
+        file.map_or(Ok(()), |file| io::write_color(&file, &image, None, &[]))
+    }
+
+    /// Notes that runs were not worth starting, once for all seeds.
+    pub fn leave_out(&mut self, run: LeftOut) {
+        let same =
+            |other: &LeftOut| (&other.scene, &other.method, &other.budget) == (&run.scene, &run.method, &run.budget);
+        if !self.results.left_out.iter().any(same) {
+            self.results.left_out.push(run);
+        }
     }
 
     fn image_file(&self, scene: &str, method: &str, budget: &str) -> PathBuf {
-        let method = method.replace([':', '=', ',', '/'], "_");
-        self.folder.join("images").join(format!("{scene}-{method}-{budget}.exr"))
+        let plain = |c: char| if c.is_ascii_alphanumeric() || c == '-' || c == '.' { c } else { '_' };
+        let name: String = format!("{scene}-{method}-{budget}").chars().map(plain).collect();
+        // File systems allow 255 bytes.
+        let start: String = name.chars().take(200).collect();
+        self.folder.join("images").join(format!("{start}.exr"))
     }
 
     /// The image of a run, if it was kept.

@@ -2,14 +2,14 @@
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use anyhow::{Result, bail};
-use fluxion::bench::{Budget, Case, LeftOut, Pilot, Ran, Results, Runner, Store};
+use fluxion::bench::{Budget, Case, Results, Runner, Runs, Store, Truth};
 use fluxion::error::Error;
 use fluxion::reconstruct::{self, METHODS};
-use fluxion::report::{Page, Shown, Summary, View, changes, table};
+use fluxion::report::{Page, Shown, Summary, View, changes, errors, table};
 
 use super::progress;
 
@@ -38,7 +38,7 @@ pub struct Args {
     /// Film size, which the references must have [default: theirs]
     #[arg(long, value_parser = super::parse_size, value_name = "WxH")]
     size: Option<(usize, usize)>,
-    /// Folder for results.json, results.csv, index.html and images, rewritten after every run
+    /// Folder for results.json, results.csv and images, complete after every run, and at the end index.html
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
     /// Go on with the results that are in the folder
@@ -70,8 +70,16 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let baseline = args.baseline.as_deref().map(Results::load).transpose()?;
     let mut store = Store::open(&args.output, args.resume)?;
     // Whatever is wrong with a scene or a reference is said before the first run.
+    let mut names = Vec::new();
     for scene in &scenes {
-        check(&load(args, scene)?, &budgets)?;
+        let case = load(args, scene)?;
+        // Fails on results that cannot be gone on with.
+        let _ = store.of(&case)?;
+        check(&case, &budgets)?;
+        if names.contains(&case.name) {
+            bail!(Error::Usage(format!("two scenes are called {}: give their folders different names", case.name)));
+        }
+        names.push(case.name);
     }
     let stop = super::stop_on_interrupt()?;
     let bar = progress::bar(args.quiet);
@@ -79,12 +87,13 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let mut done = 0;
     for scene in &scenes {
         let case = load(args, scene)?;
-        let mut bench = Bench { args, case: &case, budgets: &budgets, store: &mut store, stop: &stop };
-        bench.run(&methods, &mut |what| {
-            done += 1;
+        let mut report = |what: &str| {
             bar.set_message(format!("{}, {what}", case.name));
             progress::set(&bar, done as f32 / total as f32);
-        })?;
+            done += 1;
+        };
+        let runs = Runs { methods: &methods, budgets: &budgets, seeds: args.seeds };
+        runs.on(&case, &mut store, &stop, &mut report)?;
         if stop.load(Ordering::Relaxed) {
             break;
         }
@@ -92,12 +101,20 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     bar.finish_and_clear();
     store.save()?;
     write_page(args, &store, &scenes, &budgets, baseline.as_ref())?;
-    println!("{}", table(&Summary::new(&store.results, "relmse")).trim_end());
+    let summary = Summary::new(&store.results, "relmse");
+    print!("{}\nrelMSE within the largest budget:\n\n", table(&summary));
+    if let Some(largest) = budgets.iter().max_by(|a, b| a.amount().total_cmp(&b.amount())) {
+        print!("{}", errors(&summary, &largest.to_string()));
+    }
     warn_of_floors(&store.results);
     if stop.load(Ordering::Relaxed) {
         eprintln!("warning: stopped early; --resume goes on with what is missing");
     }
-    Ok(ExitCode::SUCCESS)
+    let failed: Vec<_> = store.results.left_out.iter().filter(|left| left.reason.starts_with("failed")).collect();
+    for left in &failed {
+        eprintln!("error: {} on {}, {}: {}", left.method, left.scene, left.budget, left.reason);
+    }
+    Ok(if failed.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
 /// Methods of a list. What follows a method's colon belongs to it as long as it looks like a parameter.
@@ -144,8 +161,11 @@ fn scenes(paths: &[PathBuf]) -> Result<Vec<PathBuf>> {
 }
 
 fn load(args: &Args, scene: &Path) -> Result<Case> {
-    let reference = (args.reference.as_os_str() != "auto").then_some(args.reference.as_path());
-    Ok(Case::load(scene, reference, args.size)?)
+    Ok(Case::load(scene, reference(args), args.size)?)
+}
+
+fn reference(args: &Args) -> Option<&Path> {
+    (args.reference.as_os_str() != "auto").then_some(args.reference.as_path())
 }
 
 /// Fails if a budget is not enough for a single sample of path tracing.
@@ -168,63 +188,6 @@ fn check(case: &Case, budgets: &[Budget]) -> Result<()> {
     Ok(())
 }
 
-/// All runs on a scene.
-struct Bench<'a> {
-    args: &'a Args,
-    case: &'a Case,
-    budgets: &'a [Budget],
-    store: &'a mut Store,
-    stop: &'a AtomicBool,
-}
-
-impl Bench<'_> {
-    fn run(&mut self, methods: &[String], report: &mut dyn FnMut(&str)) -> Result<()> {
-        let runners = methods.iter().map(|method| Runner::new(self.case, method)).collect::<Result<Vec<_>, _>>()?;
-        let mut pilots = vec![None; methods.len()];
-        for seed in 1..=self.args.seeds {
-            for (k, budget) in self.budgets.iter().enumerate() {
-                // Methods take turns, and begin with another one every time.
-                for turn in 0..runners.len() {
-                    let which = (turn + k + seed as usize) % runners.len();
-                    report(&format!("{}, {budget}, seed {seed}", methods[which]));
-                    self.cell(&runners[which], &mut pilots[which], *budget, seed)?;
-                    if self.stop.load(Ordering::Relaxed) {
-                        return Ok(());
-                    }
-                }
-            }
-        }
-        Ok(())
-    }
-
-    fn cell(&mut self, runner: &Runner, pilot: &mut Option<Pilot>, budget: Budget, seed: u64) -> Result<()> {
-        let (scene, method, text) = (&self.case.name, runner.method, budget.to_string());
-        if self.store.has(self.case, method, &text, seed)? {
-            return Ok(());
-        }
-        let tried = match *pilot {
-            Some(tried) => tried,
-            None => *pilot.insert(runner.pilot()?),
-        };
-        if let Budget::Seconds(seconds) = budget
-            && seconds < tried.finish + tried.sample
-        {
-            let (scene, method) = (scene.clone(), method.to_owned());
-            let reason = format!("reconstruction takes {:.1} s", tried.finish);
-            let left = &mut self.store.results.left_out;
-            if !left.iter().any(|left| left.scene == scene && left.method == method && left.budget == text) {
-                left.push(LeftOut { scene, method, budget: text, reason });
-            }
-            return Ok(());
-        }
-        let ran: Ran = runner.run(budget, seed, tried)?;
-        // The next run of this method knows better how long it takes.
-        let seconds = ran.record.seconds;
-        *pilot = Some(Pilot { finish: seconds.develop + seconds.reconstruct, ..tried });
-        Ok(self.store.add(ran)?)
-    }
-}
-
 /// The page: plots of everything, and the images of the middle budget.
 fn write_page(
     args: &Args,
@@ -233,25 +196,22 @@ fn write_page(
     budgets: &[Budget],
     baseline: Option<&Results>,
 ) -> Result<()> {
-    let mut names: Vec<&str> = Vec::new();
     let mut methods: Vec<&str> = Vec::new();
     for record in &store.results.records {
-        for (list, name) in [(&mut names, record.scene.as_str()), (&mut methods, record.method.as_str())] {
-            if !list.contains(&name) {
-                list.push(name);
-            }
+        if !methods.contains(&record.method.as_str()) {
+            methods.push(&record.method);
         }
     }
     let budget = budgets[budgets.len() / 2].to_string();
     let mut views = Vec::new();
     for scene in scenes {
-        let case = load(args, scene)?;
+        let (name, truth) = Truth::of(scene, reference(args))?;
         let shown = methods.iter().filter_map(|&method| {
-            Some(Shown { label: method.to_owned(), image: store.image(&case.name, method, &budget)? })
+            Some(Shown { label: method.to_owned(), image: store.image(&name, method, &budget)? })
         });
         let images: Vec<_> = shown.collect();
         if !images.is_empty() {
-            views.push(View { name: format!("{}, {budget}", case.name), reference: case.truth.image, images });
+            views.push(View { name: format!("{name}, {budget}"), reference: truth.image, images });
         }
     }
     let changes = baseline.map_or_else(Vec::new, |then| changes(&store.results, then, "relmse"));
@@ -267,6 +227,7 @@ fn write_page(
 /// Says which references are too noisy for the errors that were measured by them.
 fn warn_of_floors(results: &Results) {
     let mut scenes: Vec<&str> = results.records.iter().map(|record| record.scene.as_str()).collect();
+    scenes.sort_unstable();
     scenes.dedup();
     for scene in scenes {
         let own = results.records.iter().filter(|record| record.scene == scene);

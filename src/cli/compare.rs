@@ -17,8 +17,8 @@ pub struct Args {
     /// Images to judge, and last the reference to judge them by
     #[arg(required = true, num_args = 2.., value_name = "IMAGE")]
     images: Vec<PathBuf>,
-    /// Write the figures as JSON, an object or, of several images, a list; `-` is standard output
-    #[arg(long, value_name = "FILE", num_args = 0..=1, default_missing_value = "-")]
+    /// Write the figures as JSON, an object or, of several images, a list; to standard output or, as --json=FILE, a file
+    #[arg(long, value_name = "FILE", num_args = 0..=1, default_missing_value = "-", require_equals = true)]
     json: Option<PathBuf>,
     /// Image of the first image's error per pixel: blue is none, red the worst hundredth
     #[arg(long, value_name = "FILE")]
@@ -43,7 +43,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let maps: Vec<_> = args.map.iter().cloned().collect();
     let to_stdout = args.json.as_ref().is_some_and(|path| path.as_os_str() == "-");
     let json_file = args.json.clone().filter(|_| !to_stdout);
-    let _claims = Claims::new(&maps, &[&json_file, &args.html], None)?;
+    let inputs: Vec<_> = args.images.iter().map(PathBuf::as_path).collect();
+    let _claims = Claims::new(&maps, &[&json_file, &args.html], &inputs)?;
     let mut objects = Vec::new();
     for (path, image) in paths.iter().zip(&images) {
         let mut object = serde_json::Map::new();

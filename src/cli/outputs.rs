@@ -17,10 +17,10 @@ fn claim(path: &Path) -> Result<()> {
 pub struct Claims(Vec<PathBuf>);
 
 impl Claims {
-    /// Claims images and other files, all of them different from each other and from `input`.
-    pub fn new(images: &[PathBuf], others: &[&Option<PathBuf>], input: Option<&Path>) -> Result<Self> {
+    /// Claims images and other files, all of them different from each other and from the inputs.
+    pub fn new(images: &[PathBuf], others: &[&Option<PathBuf>], inputs: &[&Path]) -> Result<Self> {
         let others: Vec<_> = others.iter().filter_map(|path| path.as_ref()).collect();
-        let mut taken: Vec<_> = input.into_iter().map(identity).collect();
+        let mut taken: Vec<_> = inputs.iter().map(|path| identity(path)).collect();
         let mut claims = Self(Vec::new());
         for path in images {
             io::check_writable(path)?;

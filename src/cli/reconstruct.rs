@@ -39,7 +39,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let mut stats = Stats { method: args.method.method.clone(), ..Stats::default() };
     let start = Instant::now();
     let mut frame = exr::load(&args.layers)?;
-    let _claims = Claims::new(&args.output, &[&args.json], Some(&args.layers))?;
+    let _claims = Claims::new(&args.output, &[&args.json], &[&args.layers])?;
     stats.seconds.load = start.elapsed().as_secs_f64();
     stats.spp = frame.attribute("fluxion:spp").and_then(|text| text.parse().ok()).unwrap_or(0);
     stats.plan = frame.attribute("fluxion:plan").unwrap_or_default().to_owned();

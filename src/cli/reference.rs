@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use anyhow::{Result, bail};
 use fluxion::error::Error;
-use fluxion::reference::{Reference, SEED, WAVE};
+use fluxion::reference::{Reference, SEED};
 use fluxion::render::Control;
 use fluxion::scene::load;
 
@@ -18,17 +18,17 @@ use super::progress;
 pub struct Args {
     /// Scene file, Mitsuba 3 XML
     scene: PathBuf,
-    /// EXR file to write after every wave of samples; one that is there already is gone on with
+    /// EXR file to write after every wave of up to 256 samples per pixel; one that is there already is gone on with
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
     /// Stop when the estimated relMSE of the reference itself is at most this
     #[arg(long, value_name = "RELMSE", required_unless_present_any = ["time", "spp"], value_parser = parse_floor)]
     target_floor: Option<f64>,
-    /// Stop after rendering for so long in all, as in 90s, 30m or 2h
+    /// Stop after about so long in all, as in 90s, 30m or 2h
     #[arg(long, value_name = "TIME", value_parser = super::parse_time)]
     time: Option<Duration>,
     /// Stop at so many samples per pixel
-    #[arg(long, value_parser = clap::value_parser!(u32).range(2..))]
+    #[arg(long, value_parser = clap::value_parser!(u32).range(2..1 << 30))]
     spp: Option<u32>,
     /// Film size in place of the scene's, as in 640x360
     #[arg(long, value_parser = super::parse_size, value_name = "WxH")]
@@ -59,7 +59,10 @@ fn parse_floor(text: &str) -> Result<f64, String> {
 pub fn run(args: &Args) -> Result<ExitCode> {
     super::use_threads(args.threads)?;
     let there = std::fs::metadata(&args.output).is_ok_and(|found| found.len() > 0);
-    let _claims = Claims::new(std::slice::from_ref(&args.output), &[], Some(&args.scene))?;
+    if args.output.extension().is_none_or(|extension| extension != "exr") {
+        bail!(Error::io(&args.output, "references are EXR files: give it a name that ends in .exr"));
+    }
+    let _claims = Claims::new(std::slice::from_ref(&args.output), &[], &[&args.scene])?;
     let before = if there { Some(Reference::load(&args.output)?) } else { None };
     let options = load::Options { parameters: args.define.clone(), size: args.size, ..load::Options::default() };
     let scene = load::load(&args.scene, &options)?;
@@ -82,6 +85,13 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         reference.save(&args.output, args.half)?;
     }
     bar.finish_and_clear();
+    if there {
+        // It may be there as floats and wanted as half floats.
+        reference.save(&args.output, args.half)?;
+    }
+    if args.half && !reference.fits_half() {
+        eprintln!("warning: the brightest values do not fit into half floats: these are floats");
+    }
     if reference.spp == 0 {
         bail!("stopped before the first wave was done");
     }
@@ -111,11 +121,23 @@ fn same(args: &Args, before: &Reference, size: (usize, usize)) -> Result<(), Err
     Ok(())
 }
 
-/// Samples per pixel of the next wave, none when any of the limits is reached.
+/// Samples per pixel of the shortest and the longest wave.
+const WAVES: (u32, u32) = (16, 256);
+
+/// Samples per pixel of the next wave, an even number; none when any of the limits is reached. Waves begin short, so
+/// that there is a file soon, and the last one is as long as the time that is left.
 fn next_wave(args: &Args, reference: &Reference) -> Option<u32> {
     let good = args.target_floor.is_some_and(|target| reference.floor() <= target);
-    let long = args.time.is_some_and(|time| reference.seconds >= time.as_secs_f64());
-    // An even number: half of them for each half.
-    let left = args.spp.map_or(WAVE, |spp| spp.next_multiple_of(2).saturating_sub(reference.spp).min(WAVE));
-    (!good && !long && left > 0).then_some(left)
+    let wave = reference.spp.clamp(WAVES.0, WAVES.1);
+    let left = args.spp.map_or(wave, |spp| spp.next_multiple_of(2).saturating_sub(reference.spp).min(wave));
+    let in_time = match args.time {
+        Some(time) if reference.spp > 0 => {
+            let seconds = (time.as_secs_f64() - reference.seconds).max(0.0);
+            // Rounded to the nearest even number.
+            let affordable = seconds / reference.seconds.max(1e-9) * f64::from(reference.spp);
+            left.min(2 * (0.5 * affordable + 0.5) as u32)
+        }
+        _ => left,
+    };
+    (!good && in_time > 0).then_some(in_time)
 }

@@ -87,7 +87,7 @@ fn parse_sample(text: &str) -> Result<(usize, usize, u32), String> {
 pub fn run(args: &Args) -> Result<ExitCode> {
     super::use_threads(args.threads)?;
     let method = args.method.make()?;
-    let _claims = Claims::new(&args.output, &[&args.layers, &args.json], None)?;
+    let _claims = Claims::new(&args.output, &[&args.layers, &args.json], &[&args.scene])?;
     let mut stats = Stats { method: args.method.method.clone(), ..Stats::default() };
     let start = Instant::now();
     let texture_memory = args.texture_memory << 20;

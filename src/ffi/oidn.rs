@@ -30,25 +30,31 @@ impl Device {
         Ok(device)
     }
 
-    /// Filters images of `width` by `height` pixels into one. The first input decides what is denoised.
+    /// Filters images of `width` by `height` pixels into one: the colour if it is among them, else the only one.
     pub fn filter(
         &self,
         (width, height): (usize, usize),
         inputs: &[Input],
         options: &[&'static CStr],
     ) -> Result<Vec<f32>, String> {
-        let mut output = vec![0.0f32; 3 * width * height];
+        let floats = width.checked_mul(height).and_then(|pixels| pixels.checked_mul(3));
+        let floats = floats.filter(|&floats| inputs.iter().all(|(_, data)| data.len() == floats));
+        let mut output = vec![0.0f32; floats.ok_or("images of different sizes")?];
         // SAFETY: the device is valid; the filter is released below.
         let filter = unsafe { raw::oidnNewFilter(self.0, c"RT".as_ptr()) };
+        if filter.is_null() {
+            self.check()?;
+            return Err("no filter".into());
+        }
         let set = |name: *const c_char, data: *const f32| {
-            // SAFETY: `data` holds width * height pixels of three floats, which outlive the filter. Inputs are only read.
+            // SAFETY: `data` holds width * height pixels of three floats, as checked above, which outlive the filter.
+            // Inputs are only read.
             unsafe {
                 let format = raw::OIDNFormat_OIDN_FORMAT_FLOAT3;
                 raw::oidnSetSharedFilterImage(filter, name, data.cast_mut().cast(), format, width, height, 0, 0, 0);
             }
         };
         for (name, data) in inputs {
-            assert_eq!(data.len(), output.len(), "an image has the wrong size");
             set(name.as_ptr(), data.as_ptr());
         }
         set(c"output".as_ptr(), output.as_mut_ptr());

@@ -4,7 +4,7 @@
 
 use rayon::prelude::*;
 
-use super::inputs::Inputs;
+use super::inputs::{Inputs, check_memory};
 use super::{Context, Method, Parameter, Parameters, Reconstruction, Solution};
 use crate::error::{Error, Result};
 use crate::film::{Frame, Layer, Needs};
@@ -71,7 +71,7 @@ impl Reconstruction for ControlVariate {
 
     fn reconstruct(&self, frame: &Frame, context: &Context) -> Result<Solution> {
         let inputs = Inputs::new(frame, 1)?;
-        inputs.check_memory(context, METHOD.id, BYTES)?;
+        check_memory(frame, context, METHOD.id, BYTES)?;
         let all = || Estimate::of_all(&inputs);
         let solution = match self.weighting {
             Weighting::Uniform => Shares::uniform(frame).apply(&all()?, self.iterations),
@@ -101,32 +101,38 @@ struct Estimate {
 const SMOOTHING: usize = 2;
 
 impl Estimate {
-    fn new(inputs: &Inputs, mean: &Image, variance: &Image) -> Self {
+    /// `edge` is the step from a pixel to the next of the differences, and zero for colours.
+    fn new(inputs: &Inputs, mean: &Image, variance: &Image, edge: (usize, usize)) -> Self {
         let scale = inputs.scale;
         let value = |rgb: &[f32]| [rgb[0] * scale, rgb[1] * scale, rgb[2] * scale, 0.0];
         let rgb = |x: usize, y: usize| variance.pixel(x, y).iter().map(|v| v * scale * scale / 3.0).sum();
-        let variance = Planes::from_fn(variance.width, variance.height, 1, |_, x, y| rgb(x, y));
+        // Beyond the last edge there is none: its variance stands there, for the means.
+        let last = (variance.width.saturating_sub(edge.0 + 1), variance.height.saturating_sub(edge.1 + 1));
+        let variance = Planes::from_fn(variance.width, variance.height, 1, |_, x, y| rgb(x.min(last.0), y.min(last.1)));
         let variance = variance.box_mean(SMOOTHING).to_image(variance.width, variance.height, 1.0).data;
         Self { value: mean.data.par_chunks_exact(3).map(value).collect(), variance }
     }
 
     /// Colour and differences to the right and downwards, of all samples.
     fn of_all(inputs: &Inputs) -> Result<[Self; 3]> {
-        let of = |mean, variance| {
+        let of = |mean, variance, edge| {
             let (mean, variance) = (inputs.frame.require(mean)?, inputs.frame.require(variance)?);
-            Ok::<_, Error>(Self::new(inputs, mean, variance))
+            Ok::<_, Error>(Self::new(inputs, mean, variance, edge))
         };
-        let color = of(Layer::Color, Layer::ColorVariance)?;
-        Ok([color, of(Layer::Dx, Layer::DxVariance)?, of(Layer::Dy, Layer::DyVariance)?])
+        Ok([
+            of(Layer::Color, Layer::ColorVariance, (0, 0))?,
+            of(Layer::Dx, Layer::DxVariance, (1, 0))?,
+            of(Layer::Dy, Layer::DyVariance, (0, 1))?,
+        ])
     }
 
     /// The same of a half of the samples.
     fn of_half(inputs: &Inputs, half: usize) -> Result<[Self; 3]> {
-        let of = |bin| {
+        let of = |bin, edge| {
             let [mean, variance] = inputs.frame.half(bin, half)?;
-            Ok::<_, Error>(Self::new(inputs, &mean, &variance))
+            Ok::<_, Error>(Self::new(inputs, &mean, &variance, edge))
         };
-        Ok([of(Layer::BinColor)?, of(Layer::BinDx)?, of(Layer::BinDy)?])
+        Ok([of(Layer::BinColor, (0, 0))?, of(Layer::BinDx, (1, 0))?, of(Layer::BinDy, (0, 1))?])
     }
 }
 

@@ -89,17 +89,17 @@ impl<'a> Inputs<'a> {
         Ok(Planes::from_fn(mean.width, mean.height, 3, at))
     }
 
-    /// Fails if a method that takes so many bytes for every pixel may not.
-    pub fn check_memory(&self, context: &Context, method: &str, bytes: u64) -> Result<()> {
-        let needed = (bytes * (self.width * self.height) as u64).div_ceil(1 << 20);
-        if context.memory.is_some_and(|memory| memory < needed << 20) {
-            return Err(too_little(method, (self.width, self.height), needed));
-        }
-        Ok(())
-    }
-
     fn inside(&self, at: usize, length: usize) -> usize {
         if at < length { at } else { mirror(at as isize, length) }
+    }
+}
+
+/// Fails if a method that takes so many bytes for every pixel may not.
+pub fn check_memory(frame: &Frame, context: &Context, method: &str, bytes: u64) -> Result<()> {
+    let needed = (bytes * (frame.width * frame.height) as u64).div_ceil(1 << 20);
+    match context.memory {
+        Some(memory) if memory < needed << 20 => Err(too_little(method, (frame.width, frame.height), needed)),
+        _ => Ok(()),
     }
 }
 

@@ -2,7 +2,7 @@
 //! counts by its size and not by its square, so that outliers do not spread. The result is like a median: biased, and
 //! consistent.
 
-use super::inputs::Inputs;
+use super::inputs::{Inputs, check_memory};
 use super::{Context, Method, Parameter, Parameters, Reconstruction, Solution};
 use crate::error::Result;
 use crate::film::{Frame, Layer, Needs};
@@ -18,7 +18,7 @@ pub const METHOD: Method = Method {
         Parameter {
             name: "iterations",
             default: "5",
-            summary: "reweighted least squares problems, 1 to 64; one makes it l2",
+            summary: "least squares problems, 1 to 64, each weighted by the residuals of the one before",
         },
         Parameter {
             name: "epsilon",
@@ -56,7 +56,7 @@ impl Reconstruction for L1 {
 
     fn reconstruct(&self, frame: &Frame, context: &Context) -> Result<Solution> {
         let inputs = Inputs::new(frame, 1)?;
-        inputs.check_memory(context, METHOD.id, BYTES)?;
+        check_memory(frame, context, METHOD.id, BYTES)?;
         let (data, dx, dy) = (inputs.quads(Layer::Color)?, inputs.quads(Layer::Dx)?, inputs.quads(Layer::Dy)?);
         let all = vec![1.0; data.len()];
         let data = Data { width: frame.width, data: &data, edges: [&dx, &dy] };

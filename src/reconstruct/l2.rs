@@ -6,6 +6,7 @@
 
 use rayon::prelude::*;
 
+use super::inputs::check_memory;
 use super::{Context, Method, Parameter, Parameters, Reconstruction, Solution};
 use crate::error::Result;
 use crate::film::{Frame, Layer, Needs};
@@ -24,6 +25,9 @@ pub const METHOD: Method = Method {
     make,
 };
 
+/// Bytes held for every pixel besides the frame, an upper bound.
+const BYTES: u64 = 150;
+
 fn make(parameters: &Parameters) -> Result<Box<dyn Reconstruction>> {
     let alpha = parameters.get("alpha", "a number in [1e-4, 1e4]", |alpha| (1e-4..=1e4).contains(alpha))?;
     Ok(Box::new(L2 { alpha }))
@@ -38,7 +42,8 @@ impl Reconstruction for L2 {
         Needs { edges: true, ..Needs::default() }
     }
 
-    fn reconstruct(&self, frame: &Frame, _context: &Context) -> Result<Solution> {
+    fn reconstruct(&self, frame: &Frame, context: &Context) -> Result<Solution> {
+        check_memory(frame, context, METHOD.id, BYTES)?;
         let [color, dx, dy] = [Layer::Color, Layer::Dx, Layer::Dy].map(|layer| frame.require(layer));
         let (color, dx, dy) = (color?, dx?, dy?);
         let solve = |c| poisson::screened(frame.width, &color.channel(c), &dx.channel(c), &dy.channel(c), self.alpha);

@@ -4,7 +4,7 @@
 
 use rayon::prelude::*;
 
-use super::inputs::Inputs;
+use super::inputs::{Inputs, check_memory};
 use super::{Context, Method, Parameter, Parameters, Reconstruction, Solution};
 use crate::error::Result;
 use crate::film::{Frame, Layer, Needs};
@@ -67,7 +67,7 @@ impl Reconstruction for LeastTrimmed {
 
     fn reconstruct(&self, frame: &Frame, context: &Context) -> Result<Solution> {
         let inputs = Inputs::new(frame, 1)?;
-        inputs.check_memory(context, METHOD.id, BYTES)?;
+        check_memory(frame, context, METHOD.id, BYTES)?;
         let (data, dx, dy) = (inputs.quads(Layer::Color)?, inputs.quads(Layer::Dx)?, inputs.quads(Layer::Dy)?);
         let data = Data { width: frame.width, data: &data, edges: [&dx, &dy] };
         (context.progress)("denoise", 0.0);

@@ -2,7 +2,7 @@
 //! features. It needs no gradients.
 
 use super::features::{Feature, Kind};
-use super::inputs::{Inputs, raise};
+use super::inputs::{Inputs, check_memory, raise};
 use super::{Context, Method, Parameter, Parameters, Reconstruction, Solution};
 use crate::error::Result;
 use crate::film::{Frame, Needs};
@@ -58,7 +58,7 @@ impl Reconstruction for Nlm {
 
     fn reconstruct(&self, frame: &Frame, context: &Context) -> Result<Solution> {
         let inputs = Inputs::new(frame, 1)?;
-        inputs.check_memory(context, METHOD.id, BYTES)?;
+        check_memory(frame, context, METHOD.id, BYTES)?;
         let [color, variance] = inputs.color()?;
         let mut features = Vec::new();
         if self.features {

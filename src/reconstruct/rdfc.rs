@@ -1,7 +1,7 @@
 //! Robust denoising using feature and colour information (Rousselle et al. 2013) by itself. It needs no gradients.
 
 use super::features::{Feature, Kind};
-use super::inputs::{Inputs, raise};
+use super::inputs::{Inputs, check_memory, raise};
 use super::{Context, Method, Parameter, Parameters, Reconstruction, Solution};
 use crate::error::Result;
 use crate::film::{Frame, Needs};
@@ -14,8 +14,8 @@ pub const METHOD: Method = Method {
     id: "rdfc",
     summary: "three non-local means by colour and features, the best at each pixel; path tracing only, consistent",
     parameters: &[
-        Parameter { name: "window", default: "10", summary: "radius of the window, 1 to 12 pixels" },
-        Parameter { name: "choice", default: "5", summary: "radius that the choice is smoothed over, 1 to 12 pixels" },
+        Parameter { name: "window", default: "5", summary: "radius of the window, 1 to 12 pixels" },
+        Parameter { name: "choice", default: "2", summary: "radius that the choice is smoothed over, 1 to 12 pixels" },
     ],
     make,
 };
@@ -43,7 +43,7 @@ impl Reconstruction for Rdfc {
 
     fn reconstruct(&self, frame: &Frame, context: &Context) -> Result<Solution> {
         let inputs = Inputs::new(frame, 1)?;
-        inputs.check_memory(context, METHOD.id, BYTES)?;
+        check_memory(frame, context, METHOD.id, BYTES)?;
         let [mean, variance] = inputs.color()?;
         let features = [Feature::of(Kind::Albedo, &inputs)?.guide(), Feature::of(Kind::Normal, &inputs)?.guide()];
         let color = Guide { mean, variance: raise(&variance.sum(), FLOOR), tolerance: None };

@@ -2,11 +2,10 @@
 
 use serde::Serialize;
 
-use super::summary::Summary;
-use crate::bench::Results;
+use crate::bench::{Record, Results};
 
-/// Standard errors that a change must exceed to count.
-const CERTAIN: f64 = 3.0;
+/// Two-sided quantiles of Student's t at 1 %, for one degree of freedom on; more than these count as ten.
+const CERTAIN: [f64; 10] = [63.66, 9.92, 5.84, 4.60, 4.03, 3.71, 3.50, 3.36, 3.25, 3.17];
 
 /// Changes of less than this are never certain: times differ from run to run.
 const LEAST: f64 = 0.03;
@@ -20,37 +19,53 @@ pub struct Change {
     pub method: String,
     /// What was to be used up.
     pub budget: String,
-    /// Error now over error then.
+    /// Error now over error then, geometric mean over the seeds.
     pub ratio: f64,
-    /// -1 for better, 1 for worse, 0 for as it was or within the noise of the seeds.
+    /// -1 for better, 1 for worse, 0 for as it was or within the noise: of runs that are the same but for their seeds,
+    /// one in a hundred is called better or worse.
     pub verdict: i32,
 }
 
-/// Compares what both have.
+/// Compares, seed by seed, what both have on the same scenes and references and, where time is the budget, machines.
 pub fn changes(now: &Results, then: &Results, metric: &str) -> Vec<Change> {
-    let (now, then) = (Summary::new(now, metric).points, Summary::new(then, metric).points);
-    let pairs = now.iter().filter_map(|new| {
-        let same = |old: &&super::summary::Point| {
-            old.scene == new.scene && old.method == new.method && old.budget == new.budget
+    let mut pairs: Vec<(&Record, Vec<f64>)> = Vec::new();
+    for new in &now.records {
+        let Some(old) = then.records.iter().find(|old| comparable(new, old)) else { continue };
+        let (Some(a), Some(b)) = (new.metrics.get(metric), old.metrics.get(metric)) else { continue };
+        let ratio = (a / b).ln();
+        if !ratio.is_finite() {
+            continue;
+        }
+        let same = |(one, _): &(&Record, Vec<f64>)| {
+            (&one.scene, &one.method, &one.budget) == (&new.scene, &new.method, &new.budget)
         };
-        let old = then.iter().find(same)?;
-        let ratio = new.error() / old.error();
-        let noise = (relative_noise(&new.errors) + relative_noise(&old.errors)).sqrt();
-        let certain = ratio.ln().abs() > LEAST.max(CERTAIN * noise);
-        let verdict = if !certain || !ratio.is_finite() { 0 } else { ratio.ln().signum() as i32 };
-        let (scene, method, budget) = (new.scene.clone(), new.method.clone(), new.budget.clone());
-        Some(Change { scene, method, budget, ratio, verdict })
-    });
-    pairs.collect()
+        match pairs.iter().position(same) {
+            Some(at) => pairs[at].1.push(ratio),
+            None => pairs.push((new, vec![ratio])),
+        }
+    }
+    let change = |(record, ratios): (&Record, Vec<f64>)| {
+        let (scene, method, budget) = (record.scene.clone(), record.method.clone(), record.budget.clone());
+        let (mean, verdict) = judge(&ratios);
+        Change { scene, method, budget, ratio: mean.exp(), verdict }
+    };
+    pairs.into_iter().map(change).collect()
 }
 
-/// Squared standard error of the mean, over the square of the mean. One value might be anything.
-fn relative_noise(errors: &[f64]) -> f64 {
-    let n = errors.len() as f64;
-    if errors.len() < 2 {
-        return f64::INFINITY;
-    }
-    let mean = errors.iter().sum::<f64>() / n;
-    let squares: f64 = errors.iter().map(|error| (error - mean) * (error - mean)).sum();
-    squares / (n - 1.0) / n / (mean * mean).max(f64::MIN_POSITIVE)
+fn comparable(new: &Record, old: &Record) -> bool {
+    let key = |record: &Record| (record.scene.clone(), record.method.clone(), record.budget.clone(), record.seed);
+    let measured = |record: &Record| (record.fingerprint.clone(), record.width, record.height, record.floor);
+    let timed = !new.budget.ends_with("spp");
+    key(new) == key(old) && measured(new) == measured(old) && (!timed || new.machine == old.machine)
+}
+
+/// Mean of logarithms of ratios, and whether it is certainly below or above zero.
+fn judge(ratios: &[f64]) -> (f64, i32) {
+    let n = ratios.len() as f64;
+    let mean = ratios.iter().sum::<f64>() / n;
+    let Some(freedom) = ratios.len().checked_sub(2) else { return (mean, 0) };
+    let squares: f64 = ratios.iter().map(|ratio| (ratio - mean) * (ratio - mean)).sum();
+    let noise = (squares / (n - 1.0) / n).sqrt();
+    let certain = mean.abs() > LEAST.max(CERTAIN[freedom.min(CERTAIN.len() - 1)] * noise);
+    (mean, if certain { mean.signum() as i32 } else { 0 })
 }

@@ -8,4 +8,4 @@ mod summary;
 pub use self::changes::{Change, changes};
 pub use self::page::{Page, Shown, View};
 pub use self::picture::heat;
-pub use self::summary::{Row, Summary, table};
+pub use self::summary::{Row, Summary, errors, table};

@@ -39,7 +39,7 @@ function ticks(low, high) {
 
 function plot(scene, metric, summary, colors) {
   const [width, height, left, bottom] = [400, 300, 52, 30];
-  const points = summary.points.filter((point) => point.scene === scene && point.errors.every((e) => e > 0));
+  const points = summary.points.filter((point) => point.scene === scene && point.seconds > 0 && point.errors.every((e) => e > 0));
   const svg = document.createElementNS(SVG, "svg");
   svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
   const box = make("div", { class: "plot" }, make("h3", {}, scene), svg);
@@ -113,7 +113,8 @@ function results() {
   const choice = make("select", { id: "metric", onchange: () => show(choice.value) },
     ...data.plotted.map((metric) => make("option", { value: metric }, metric)));
   section.append(make("h2", {}, "Error against time"), make("div", { class: "bar" }, choice), tables,
-    make("p", {}, "Error over primal's: geometric mean over scenes and budgets. Speed-up: the time path tracing would "
+    make("p", {}, "Error over primal's: after the same time (with the same samples, if these are the budget), geometric mean over "
+      + "those scenes and budgets that all methods have. Speed-up: the time path tracing would "
       + "need for the method's error at its largest budget, over the method's. Slope: median over scenes of error over "
       + "time, as logarithms. Wins: scenes and budgets with the least error."),
     make("p", {}, "Dots are means over seeds, bars reach from the best to the worst seed; the dashed line is the "

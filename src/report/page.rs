@@ -84,7 +84,7 @@ impl Page<'_> {
         });
         let data = serde_json::to_string(&data).map_err(|error| Error::Usage(error.to_string()))?;
         // Nothing in the data may end the element that holds it.
-        let data = data.replace("</", "<\\/");
+        let data = data.replace('<', "\\u003c");
         Ok(include_str!("page.html")
             .replace("{{title}}", &self.title.replace('&', "&amp;").replace('<', "&lt;"))
             .replace("{{style}}", include_str!("page.css"))

@@ -27,6 +27,11 @@ pub struct Point {
 }
 
 impl Point {
+    /// Whether it is on the same scene within the same budget.
+    fn beside(&self, other: &Self) -> bool {
+        self.scene == other.scene && self.budget == other.budget
+    }
+
     /// Mean over the seeds.
     pub fn error(&self) -> f64 {
         self.errors.iter().sum::<f64>() / self.errors.len() as f64
@@ -38,7 +43,8 @@ impl Point {
 pub struct Row {
     /// The method with its parameters.
     pub method: String,
-    /// Geometric mean of its error over path tracing's, over scenes and budgets.
+    /// Geometric mean of its error over path tracing's after the same time, or with the same samples if these are the
+    /// budget; over those scenes and budgets that all methods have, so that it compares between methods.
     pub ratio: Option<f64>,
     /// Geometric mean over scenes of the time that path tracing would take, by its own line through its errors, for the
     /// error that the method has at its largest budget, over the method's time.
@@ -70,7 +76,12 @@ impl Summary {
                 methods.push(&point.method);
             }
         }
-        let mut rows: Vec<Row> = methods.into_iter().map(|method| row(&points, method)).collect();
+        let everywhere = |point: &&Point| {
+            let has = |method: &&str| points.iter().any(|other| other.method == **method && other.beside(point));
+            methods.iter().all(|method| has(method))
+        };
+        let common: Vec<&Point> = points.iter().filter(everywhere).collect();
+        let mut rows: Vec<Row> = methods.iter().map(|method| row(&points, &common, method)).collect();
         let rank = |row: &Row| row.ratio.unwrap_or(f64::INFINITY);
         rows.sort_by(|a, b| rank(a).total_cmp(&rank(b)));
         Self { rows, points }
@@ -99,50 +110,70 @@ fn points(results: &Results, metric: &str) -> Vec<Point> {
     points
 }
 
-fn row(points: &[Point], method: &str) -> Row {
+fn row(points: &[Point], common: &[&Point], method: &str) -> Row {
     let own: Vec<&Point> = points.iter().filter(|point| point.method == method).collect();
-    let of_base = |scene: &str| {
+    let base = |scene: &str| {
         let base = points.iter().filter(|point| point.method == BASE && point.scene == scene);
-        base.map(|point| (point.seconds.ln(), point.error().ln())).collect::<Vec<_>>()
+        let mut base: Vec<_> = base.map(|point| (point.seconds.ln(), point.error().ln())).collect();
+        base.sort_by(|a, b| a.0.total_cmp(&b.0));
+        base
     };
-    let ratios = own.iter().filter_map(|point| {
-        let same = |base: &&Point| base.method == BASE && base.scene == point.scene && base.budget == point.budget;
-        Some((point.error() / points.iter().find(same)?.error()).ln())
+    let ratios = common.iter().filter(|point| point.method == method).filter_map(|point| {
+        let same = points.iter().find(|other| other.method == BASE && other.beside(point))?;
+        let base = match point.budget.ends_with("spp") {
+            true => same.error().ln(),
+            false => interpolate(&base(&point.scene), point.seconds.ln()),
+        };
+        Some(point.error().ln() - base)
     });
     let mut scenes: BTreeMap<&str, Vec<&Point>> = BTreeMap::new();
     own.iter().for_each(|point| scenes.entry(&point.scene).or_default().push(point));
-    let mut slopes: Vec<f64> = scenes
-        .values()
-        .filter_map(|points| {
-            let points: Vec<_> = points.iter().map(|point| (point.seconds.ln(), point.error().ln())).collect();
-            line(&points).map(|(_, slope)| slope)
-        })
-        .collect();
-    slopes.sort_by(f64::total_cmp);
+    let slopes = scenes.values().filter_map(|points| {
+        let points: Vec<_> = points.iter().map(|point| (point.seconds.ln(), point.error().ln())).collect();
+        line(&points).map(|(_, slope)| slope)
+    });
     let speedups = scenes.iter().filter_map(|(scene, points)| {
         let last = points.iter().max_by(|a, b| a.seconds.total_cmp(&b.seconds))?;
-        let (start, slope) = line(&of_base(scene)).filter(|(_, slope)| *slope < -0.1)?;
+        let (start, slope) = line(&base(scene)).filter(|(_, slope)| *slope < -0.1)?;
         Some((last.error().ln() - start) / slope - last.seconds.ln())
     });
     let best = |point: &&&Point| {
-        let rivals = points.iter().filter(|rival| rival.scene == point.scene && rival.budget == point.budget);
+        let rivals = points.iter().filter(|rival| rival.beside(point));
         rivals.map(Point::error).fold(f64::INFINITY, f64::min) >= point.error()
     };
     Row {
         method: method.to_owned(),
         ratio: geometric_mean(ratios),
         speedup: geometric_mean(speedups),
-        slope: slopes.get(slopes.len() / 2).copied(),
+        slope: median(slopes.collect()),
         wins: own.iter().filter(best).count(),
         runs: own.len(),
     }
 }
 
-/// The exponential of the mean; none of nothing and of what is not finite.
+/// The value at `x` on the lines between points that are sorted by `x`, and on the outer ones beyond. A single point
+/// lies on a line of slope -1, as errors of independent samples do.
+fn interpolate(points: &[(f64, f64)], x: f64) -> f64 {
+    let next = points.partition_point(|point| point.0 < x).clamp(1, points.len().max(2) - 1);
+    match (points.get(next - 1), points.get(next)) {
+        (Some(a), Some(b)) if b.0 > a.0 => a.1 + (b.1 - a.1) * (x - a.0) / (b.0 - a.0),
+        (Some(a), _) => a.1 - (x - a.0),
+        _ => f64::NAN,
+    }
+}
+
+/// The middle value, or the mean of the middle two.
+fn median(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    let (low, high) = (values.get(values.len().checked_sub(1)? / 2)?, values.get(values.len() / 2)?);
+    Some(0.5 * (low + high))
+}
+
+/// The exponential of the mean of what is finite; none of nothing.
 fn geometric_mean(logarithms: impl Iterator<Item = f64>) -> Option<f64> {
-    let all: Vec<f64> = logarithms.collect();
+    let all: Vec<f64> = logarithms.filter(|value| value.is_finite()).collect();
     let mean = (all.iter().sum::<f64>() / all.len() as f64).exp();
-    Some(mean).filter(|mean| mean.is_finite() && *mean > 0.0)
+    Some(mean).filter(|mean| mean.is_finite())
 }
 
 /// Least squares line through points: value at zero, and slope. None without two different abscissae.
@@ -165,6 +196,25 @@ pub fn table(summary: &Summary) -> String {
     for Row { method, ratio, speedup, slope, wins, runs } in &summary.rows {
         let (ratio, speedup, slope) = (number(*ratio, 3), number(*speedup, 1), number(*slope, 2));
         text += &format!("| {method} | {ratio} | {speedup} | {slope} | {wins} | {runs} |\n");
+    }
+    text
+}
+
+/// Errors within a budget as a Markdown table: a row for each method, a column for each scene.
+pub fn errors(summary: &Summary, budget: &str) -> String {
+    let mut scenes: Vec<&str> = Vec::new();
+    for point in &summary.points {
+        if !scenes.contains(&point.scene.as_str()) {
+            scenes.push(&point.scene);
+        }
+    }
+    let mut text = format!("| {budget} | {} |\n|{}\n", scenes.join(" | "), "---|".repeat(scenes.len() + 1));
+    for Row { method, .. } in &summary.rows {
+        let cells = scenes.iter().map(|scene| {
+            let same = |point: &&Point| point.scene == *scene && point.method == *method && point.budget == budget;
+            summary.points.iter().find(same).map_or("-".into(), |point| format!("{:.2e}", point.error()))
+        });
+        text += &format!("| {method} | {} |\n", cells.collect::<Vec<_>>().join(" | "));
     }
     text
 }
@@ -217,6 +267,29 @@ mod tests {
         assert!(close(row(2).speedup, 1.0 / (0.3 / 2.0) / 4.0));
         assert_eq!((row(0).wins, row(1).wins, row(2).wins), (0, 3, 0));
         assert!(table(&summary).contains("| good | 0.100 | 10.0 | -1.00 | 3 | 3 |"));
+        let errors = errors(&summary, "4s");
+        assert!(errors.starts_with("| 4s | room |\n|---|---|\n") && errors.contains("| good | 2.50e-2 |"), "{errors}");
+    }
+
+    #[test]
+    fn methods_are_ranked_by_what_all_of_them_have() {
+        let mut uneven = results(&[("primal", 1.0, 1.0), ("late", 0.5, 1.0), ("steep", 1.0, 2.0)]);
+        uneven.records.retain(|record| record.method != "late" || record.budget == "4s");
+        let summary = Summary::new(&uneven, "relmse");
+        let ratio = |method: &str| summary.rows.iter().find(|row| row.method == method).unwrap().ratio.unwrap();
+        // At four seconds only, where the steep one has a quarter.
+        assert!((ratio("steep") - 0.25).abs() < 1e-9 && (ratio("late") - 0.5).abs() < 1e-9);
+    }
+
+    #[test]
+    fn path_tracing_is_taken_at_the_time_that_was_used() {
+        let points = [(0.0, 0.0), (1.0, -1.0), (2.0, -3.0)];
+        for (x, y) in [(0.5, -0.5), (1.5, -2.0), (-1.0, 1.0), (3.0, -5.0), (1.0, -1.0)] {
+            assert!((interpolate(&points, x) - y).abs() < 1e-12, "{x}");
+        }
+        assert!((interpolate(&points[..1], 0.7) + 0.7).abs() < 1e-12);
+        assert!(interpolate(&[], 0.7).is_nan());
+        assert_eq!((median(vec![3.0, 1.0]), median(vec![])), (Some(2.0), None));
     }
 
     #[test]

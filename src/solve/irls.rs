@@ -22,8 +22,13 @@ impl Default for Options {
     }
 }
 
-/// Residuals of every least squares problem are brought down to this share: the next weights matter more.
+/// Residuals of every least squares problem are brought down to this share, as the next weights matter more; those of
+/// the last one further.
 const TOLERANCE: f64 = 0.1;
+const LAST: f64 = 0.02;
+
+/// Weights are at most one over this.
+const LEAST: f32 = 1e-7;
 
 /// Minimises Σ α |u - data| + Σ |Dx u - dx| + Σ |Dy u - dy|, where |.| is the length of a colour. Edges whose `kept`
 /// is zero are left out.
@@ -31,7 +36,7 @@ pub fn solve(data: Data, kept: [&[f32]; 2], alpha: f32, options: Options) -> Vec
     let nodes = data.data.len();
     let mut u = data.data.to_vec();
     for k in 0..options.iterations {
-        let epsilon = options.epsilon * options.decay.powi(k as i32 - 1);
+        let epsilon = (options.epsilon * options.decay.powi(k as i32 - 1)).max(LEAST);
         let weight = |length: f32| if k == 0 { 1.0 } else { 1.0 / (length + epsilon) };
         let along = |axis: usize, step: usize| -> Vec<f32> {
             let residual = |i: usize| match u.get(i + step) {
@@ -46,7 +51,8 @@ pub fn solve(data: Data, kept: [&[f32]; 2], alpha: f32, options: Options) -> Vec
             down: along(1, data.width),
             screen: (0..nodes).into_par_iter().map(own).collect(),
         };
-        u = weights.solver(data.width).solve(&weights.right(data), u, TOLERANCE).x;
+        let tolerance = if k + 1 < options.iterations { TOLERANCE } else { LAST };
+        u = weights.solver(data.width).solve(&weights.right(data), u, tolerance).x;
     }
     u
 }

@@ -7,7 +7,7 @@
 mod regression;
 
 use self::regression::regress;
-use super::inputs::{Inputs, raise};
+use super::inputs::{Inputs, check_memory, raise};
 use super::{Context, Method, Parameter, Parameters, Reconstruction, Solution};
 use crate::error::Result;
 use crate::film::{Frame, Layer, Needs};
@@ -48,10 +48,11 @@ impl Reconstruction for Nfor {
 
     fn reconstruct(&self, frame: &Frame, context: &Context) -> Result<Solution> {
         let inputs = Inputs::new(frame, 1)?;
-        inputs.check_memory(context, METHOD.id, BYTES)?;
+        check_memory(frame, context, METHOD.id, BYTES)?;
         (context.progress)("features", 0.0);
         let [color, variance] = inputs.color()?;
-        let variance = raise(&variance.sum(), FLOOR);
+        let own = variance.sum();
+        let variance = raise(&own, FLOOR);
         let features = features(&inputs)?;
         let halves = [inputs.half(0)?, inputs.half(1)?];
         // Half the samples have twice the variance.
@@ -72,7 +73,7 @@ impl Reconstruction for Nfor {
                 Settings { window: regression::WINDOW, patch: 1, color: 1.0, feature: None },
             )
         };
-        let errors = [0, 1].map(|t: usize| smooth(&error(&halves, &candidates[t], &of_half)));
+        let errors = [0, 1].map(|t: usize| smooth(&error(&halves, &candidates[t], &own)));
         let share = smooth(&errors[0].zip(&errors[1], |a, b| f32::from(u8::from(a < b))));
         let blend = |a: &Planes, b: &Planes| {
             Planes::from_fn(a.width, a.height, a.channels(), |c, x, y| {
@@ -98,12 +99,13 @@ impl Reconstruction for Nfor {
 }
 
 /// Estimated squared error of the mean of two filtered halves, sum over the channels: how far each is from the half it
-/// has not seen, less that half's own variance, less what their mean gains.
-fn error(halves: &[Planes; 2], filtered: &[Planes; 2], of_half: &Planes) -> Planes {
+/// has not seen, less that half's own variance, which is
+/// twice that of all samples, less what their mean gains.
+fn error(halves: &[Planes; 2], filtered: &[Planes; 2], variance: &Planes) -> Planes {
     let square = |a: &Planes, b: &Planes| a.zip(b, |a, b| (a - b) * (a - b)).sum();
     let sum = square(&halves[1], &filtered[0]).zip(&square(&halves[0], &filtered[1]), |a, b| 0.5 * (a + b));
     let gain = square(&filtered[0], &filtered[1]);
-    sum.zip(&gain, |sum, gain| sum - 0.25 * gain).zip(of_half, |error, noise| error - noise)
+    sum.zip(&gain, |sum, gain| sum - 0.25 * gain).zip(variance, |error, variance| error - 2.0 * variance)
 }
 
 /// Albedo, normal and depth, each filtered by itself, the depth in units of the largest.

@@ -82,8 +82,13 @@ pub struct Loader {
 pub fn load(path: &Path, options: &Options) -> Result<Scene> {
     let tree = xml::parse(path, &options.parameters)?;
     let objects = tree.objects.clone();
-    let fingerprint =
-        tree.sources.iter().flat_map(|source| source.bytes()).fold(0, |h, b| rng::combine(h, u64::from(b)));
+    // Definitions that the text asks for belong to it.
+    let used = |name: &str| tree.sources.iter().any(|source| source.contains(&format!("${name}")));
+    let mut given: Vec<_> = options.parameters.iter().filter(|(name, _)| used(name)).collect();
+    given.sort();
+    let definitions = given.iter().flat_map(|(name, value)| [name, value]);
+    let text = tree.sources.iter().chain(definitions).flat_map(|text| text.bytes());
+    let fingerprint = text.fold(0, |h, b| rng::combine(h, u64::from(b)));
     let mut loader = Loader {
         tree,
         bsdfs: HashMap::new(),
