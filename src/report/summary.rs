@@ -78,7 +78,7 @@ impl Summary {
         }
         let everywhere = |point: &&Point| {
             let has = |method: &&str| points.iter().any(|other| other.method == **method && other.beside(point));
-            methods.iter().all(|method| has(method))
+            methods.iter().all(has)
         };
         let common: Vec<&Point> = points.iter().filter(everywhere).collect();
         let mut rows: Vec<Row> = methods.iter().map(|method| row(&points, &common, method)).collect();

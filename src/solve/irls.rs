@@ -22,10 +22,8 @@ impl Default for Options {
     }
 }
 
-/// Residuals of every least squares problem are brought down to this share, as the next weights matter more; those of
-/// the last one further.
+/// Residuals of every least squares problem are brought down to this share: weights matter more than the last digits.
 const TOLERANCE: f64 = 0.1;
-const LAST: f64 = 0.02;
 
 /// Weights are at most one over this.
 const LEAST: f32 = 1e-7;
@@ -51,8 +49,7 @@ pub fn solve(data: Data, kept: [&[f32]; 2], alpha: f32, options: Options) -> Vec
             down: along(1, data.width),
             screen: (0..nodes).into_par_iter().map(own).collect(),
         };
-        let tolerance = if k + 1 < options.iterations { TOLERANCE } else { LAST };
-        u = weights.solver(data.width).solve(&weights.right(data), u, tolerance).x;
+        u = weights.solver(data.width).solve(&weights.right(data), u, TOLERANCE).x;
     }
     u
 }
