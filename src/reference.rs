@@ -112,20 +112,6 @@ impl Reference {
         self.spp += 2 * spp;
     }
 
-    /// Fails if the reference is not of this scene.
-    pub fn check(&self, path: &Path, scene: &Scene) -> Result<()> {
-        let other = fingerprint(scene);
-        if self.fingerprint != other {
-            let what = format!(
-                "is the reference of another scene or of an older version of it (fingerprint {}, the scene has \
-                 {other}); `fluxion reference` makes one",
-                self.fingerprint
-            );
-            return Err(Error::io(path, what));
-        }
-        Ok(())
-    }
-
     /// Whether every value is one that half floats have room for.
     pub fn fits_half(&self) -> bool {
         self.image.data.iter().chain(&self.difference.data).all(|value| value.abs() <= HALF_MAX)
@@ -188,8 +174,7 @@ impl Reference {
         };
         let [image, mut variance, difference] = [0, 3, 6].map(|first| channels(&positions[first..first + 3]));
         for (what, image) in [("value", &image), ("standard error", &variance), ("difference", &difference)] {
-            if let Some(at) = image.data.iter().position(|value| !value.is_finite()) {
-                let (x, y) = (at / 3 % image.width, at / 3 / image.width);
+            if let Some((x, y, _)) = image.not_finite() {
                 return Err(Error::io(path, format!("the {what} at pixel {x},{y} is not finite")));
             }
         }
@@ -213,6 +198,19 @@ fn not_one(path: &Path, why: &str) -> Error {
 /// The scene's fingerprint as it stands in headers.
 pub fn fingerprint(scene: &Scene) -> String {
     format!("{:016x}", scene.fingerprint())
+}
+
+/// Fails if a reference with the fingerprint `known` is not of this scene.
+pub fn check(known: &str, path: &Path, scene: &Scene) -> Result<()> {
+    let other = fingerprint(scene);
+    if known != other {
+        let what = format!(
+            "is the reference of another scene or of an older version of it (fingerprint {known}, the scene has \
+             {other}); `fluxion reference` makes one"
+        );
+        return Err(Error::io(path, what));
+    }
+    Ok(())
 }
 
 /// Radiance with directly seen emitters, and its variance.

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use crate::error::{Error, Result};
 use crate::image::{Image, io};
-use crate::reference::Reference;
+use crate::reference::{Reference, check};
 use crate::scene::{Scene, load};
 
 /// A reference image.
@@ -34,7 +34,7 @@ impl Case {
     pub fn load(path: &Path, reference: Option<&Path>, size: Option<(usize, usize)>) -> Result<Self> {
         let name = name(path);
         let file = find(path, &name, reference)?;
-        let truth = Truth::load(&file)?;
+        let (truth, known) = truth(&file)?;
         let there = (truth.image.width, truth.image.height);
         let start = Instant::now();
         let scene = load::load(path, &load::Options { size: size.or(Some(there)), ..load::Options::default() })?;
@@ -44,8 +44,8 @@ impl Case {
             let what = format!("has {}x{} pixels, not {}x{}", there.0, there.1, wanted.0, wanted.1);
             return Err(Error::io(&file, what));
         }
-        if Reference::is_one(&file)? {
-            Reference::load(&file)?.check(&file, &scene)?;
+        if let Some(known) = known {
+            check(&known, &file, &scene)?;
         }
         Ok(Self { name, scene, truth, load })
     }
@@ -55,23 +55,23 @@ impl Truth {
     /// The reference of a scene, as [`Case::load`] finds it, with the scene's name.
     pub fn of(path: &Path, reference: Option<&Path>) -> Result<(String, Self)> {
         let name = name(path);
-        let truth = Self::load(&find(path, &name, reference)?)?;
+        let (truth, _) = truth(&find(path, &name, reference)?)?;
         Ok((name, truth))
     }
+}
 
-    fn load(path: &Path) -> Result<Self> {
-        if Reference::is_one(path)? {
-            let reference = Reference::load(path)?;
-            let floor = Some(reference.floor());
-            return Ok(Self { image: reference.image, floor });
-        }
-        let image = io::read_color(path)?;
-        if let Some(at) = image.data.iter().position(|value| !value.is_finite()) {
-            let (x, y) = (at / 3 % image.width, at / 3 / image.width);
-            return Err(Error::io(path, format!("the value at pixel {x},{y} is not finite")));
-        }
-        Ok(Self { image, floor: None })
+/// The image of a file, with the fingerprint of its scene if it is one of Fluxion's own references.
+fn truth(path: &Path) -> Result<(Truth, Option<String>)> {
+    if Reference::is_one(path)? {
+        let reference = Reference::load(path)?;
+        let floor = Some(reference.floor());
+        return Ok((Truth { image: reference.image, floor }, Some(reference.fingerprint)));
     }
+    let image = io::read_color(path)?;
+    if let Some((x, y, _)) = image.not_finite() {
+        return Err(Error::io(path, format!("the value at pixel {x},{y} is not finite")));
+    }
+    Ok((Truth { image, floor: None }, None))
 }
 
 /// Name of a scene file.

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use anyhow::{Result, bail};
 use fluxion::error::Error;
-use fluxion::reference::{Reference, SEED};
+use fluxion::reference::{Reference, SEED, check};
 use fluxion::render::Control;
 use fluxion::scene::load;
 
@@ -68,7 +68,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let scene = load::load(&args.scene, &options)?;
     let mut reference = match before {
         Some(before) => {
-            before.check(&args.output, &scene)?;
+            check(&before.fingerprint, &args.output, &scene)?;
             same(args, &before, (scene.sensor().width, scene.sensor().height))?;
             before
         }

@@ -75,6 +75,13 @@ impl Image {
         self.data.iter_mut().zip(&other.data).for_each(|(sum, value)| *sum += value);
     }
 
+    /// Column, row and channel of the first sample that is not finite.
+    pub fn not_finite(&self) -> Option<(usize, usize, usize)> {
+        let at = self.data.iter().position(|value| !value.is_finite())?;
+        let pixel = at / self.channels;
+        Some((pixel % self.width, pixel / self.width, at % self.channels))
+    }
+
     /// Width, height and channels, for comparison and messages.
     pub fn shape(&self) -> (usize, usize, usize) {
         (self.width, self.height, self.channels)

@@ -38,8 +38,7 @@ pub fn check(image: &Image, reference: &Image) -> Result<()> {
         return Err(Error::Usage(format!("the images differ in shape: {} and {}", text(image), text(reference))));
     }
     for (name, image) in [("image", image), ("reference", reference)] {
-        if let Some(at) = image.data.iter().position(|value| !value.is_finite()) {
-            let (x, y) = (at / 3 % image.width, at / 3 / image.width);
+        if let Some((x, y, _)) = image.not_finite() {
             return Err(Error::Usage(format!("the {name} is not finite at pixel {x},{y}")));
         }
     }

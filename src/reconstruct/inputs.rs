@@ -6,8 +6,12 @@ use super::Context;
 use crate::error::{Error, Result};
 use crate::film::{Frame, Layer};
 use crate::image::Image;
+use crate::image::nl_means::Guide;
 use crate::image::planes::{Planes, mirror};
 use crate::solve::graph::Quad;
+
+/// Share of the mean variance around it that a colour's variance is raised to.
+pub const FLOOR: f32 = 0.5;
 
 /// Scattered radiance, as layers of a frame.
 pub struct Inputs<'a> {
@@ -46,6 +50,12 @@ impl<'a> Inputs<'a> {
     /// Radiance and its variance.
     pub fn color(&self) -> Result<[Planes; 2]> {
         Ok([self.planes(Layer::Color, self.scale)?, self.planes(Layer::ColorVariance, self.scale * self.scale)?])
+    }
+
+    /// What pixels are compared by: the colour, its variance raised to a share of those around.
+    pub fn guide(&self) -> Result<Guide> {
+        let [mean, variance] = self.color()?;
+        Ok(Guide { mean, variance: raise(&variance.sum(), FLOOR), tolerance: None })
     }
 
     /// Differences along `axis` (0: to the right, 1: downwards) and their variances. Where the image is mirrored
@@ -109,6 +119,13 @@ pub fn too_little(method: &str, (width, height): (usize, usize), megabytes: u64)
         "reconstructing {width}x{height} pixels with {method} takes {megabytes} MB besides the layers; allow it with \
          --max-memory {megabytes}"
     ))
+}
+
+/// Three channels of planes from `first` on, pixel by pixel, as solvers take them.
+pub fn quads(planes: &Planes, first: usize) -> Vec<Quad> {
+    let (width, pixels) = (planes.width, planes.width * planes.height);
+    let value = |i: usize, c: usize| planes.at(first + c, (i % width) as isize, (i / width) as isize);
+    (0..pixels).into_par_iter().map(|i| [value(i, 0), value(i, 1), value(i, 2), 0.0]).collect()
 }
 
 /// Variances raised to a share of the mean around them. Where all samples were zero the sample variance is zero too,

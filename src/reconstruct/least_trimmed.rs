@@ -4,12 +4,11 @@
 
 use rayon::prelude::*;
 
-use super::inputs::{Inputs, check_memory};
+use super::inputs::{Inputs, check_memory, quads};
 use super::{Context, Method, Parameter, Parameters, Reconstruction, Solution};
 use crate::error::Result;
 use crate::film::{Frame, Layer, Needs};
 use crate::image::nl_means::{self, Guide, Guides, Settings};
-use crate::image::planes::Planes;
 use crate::solve::graph::Quad;
 use crate::solve::irls;
 use crate::solve::poisson::{Data, Weights};
@@ -113,12 +112,6 @@ impl LeastTrimmed {
         let weights = Weights { across: across.clone(), down: down.clone(), screen };
         weights.solver(data.width).solve(&weights.right(data), start, tolerance).x
     }
-}
-
-fn quads(planes: &Planes, first: usize) -> Vec<Quad> {
-    let (width, pixels) = (planes.width, planes.width * planes.height);
-    let value = |i: usize, c: usize| planes.at(first + c, (i % width) as isize, (i / width) as isize);
-    (0..pixels).into_par_iter().map(|i| [value(i, 0), value(i, 1), value(i, 2), 0.0]).collect()
 }
 
 /// Squared distance as relMSE has it, with the denoised image as reference.

@@ -113,10 +113,8 @@ pub fn parse(text: &str) -> Result<Box<dyn Reconstruction>> {
 /// Reconstructs a frame: checks that it is finite, and adds the directly seen emitters to the method's image.
 pub fn solve(method: &dyn Reconstruction, frame: &Frame, context: &Context) -> Result<Solution> {
     for (layer, image) in frame.present() {
-        if let Some(at) = image.data.iter().position(|value| !value.is_finite()) {
-            let pixel = at / image.channels;
-            let (x, y) = (pixel % frame.width, pixel / frame.width);
-            let what = format!("channel {} is not finite at pixel {x},{y}", layer.channel_names()[at % image.channels]);
+        if let Some((x, y, c)) = image.not_finite() {
+            let what = format!("channel {} is not finite at pixel {x},{y}", layer.channel_names()[c]);
             return Err(Error::Usage(what));
         }
     }

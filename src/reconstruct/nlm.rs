@@ -2,11 +2,11 @@
 //! features. It needs no gradients.
 
 use super::features::{Feature, Kind};
-use super::inputs::{Inputs, check_memory, raise};
+use super::inputs::{Inputs, check_memory};
 use super::{Context, Method, Parameter, Parameters, Reconstruction, Solution};
 use crate::error::Result;
 use crate::film::{Frame, Needs};
-use crate::image::nl_means::{self, Guide, Guides, Settings};
+use crate::image::nl_means::{self, Guides, Settings};
 
 /// `nlm`.
 pub const METHOD: Method = Method {
@@ -30,9 +30,6 @@ const BYTES: u64 = 250;
 
 /// Tolerance of features, in standard deviations.
 const FEATURE: f32 = 0.6;
-
-/// Share of the mean variance around it that a colour's variance is raised to.
-const FLOOR: f32 = 0.5;
 
 fn make(parameters: &Parameters) -> Result<Box<dyn Reconstruction>> {
     Ok(Box::new(Nlm {
@@ -59,16 +56,15 @@ impl Reconstruction for Nlm {
     fn reconstruct(&self, frame: &Frame, context: &Context) -> Result<Solution> {
         let inputs = Inputs::new(frame, 1)?;
         check_memory(frame, context, METHOD.id, BYTES)?;
-        let [color, variance] = inputs.color()?;
         let mut features = Vec::new();
         if self.features {
             for kind in [Kind::Albedo, Kind::Normal] {
                 features.push(Feature::of(kind, &inputs)?.guide());
             }
         }
-        let guide = Guide { mean: color.clone(), variance: raise(&variance.sum(), FLOOR), tolerance: None };
         let settings = Settings { feature: self.features.then_some(FEATURE), ..self.settings };
-        let filtered = nl_means::filter(&color, &Guides { color: guide, features }, settings);
+        let guides = Guides { color: inputs.guide()?, features };
+        let filtered = nl_means::filter(&guides.color.mean, &guides, settings);
         let image = filtered.to_image(frame.width, frame.height, 1.0 / inputs.scale);
         Ok(Solution { image, error: None, notes: Vec::new() })
     }

@@ -1,12 +1,12 @@
 //! Robust denoising using feature and colour information (Rousselle et al. 2013) by itself. It needs no gradients.
 
 use super::features::{Feature, Kind};
-use super::inputs::{Inputs, check_memory, raise};
+use super::inputs::{Inputs, check_memory};
 use super::{Context, Method, Parameter, Parameters, Reconstruction, Solution};
 use crate::error::Result;
 use crate::film::{Frame, Needs};
+use crate::image::nl_means::Guides;
 use crate::image::nl_means::rdfc::{self, Denoised, Options};
-use crate::image::nl_means::{Guide, Guides};
 use crate::image::planes::Planes;
 
 /// `rdfc`.
@@ -22,9 +22,6 @@ pub const METHOD: Method = Method {
 
 /// Bytes held for every pixel besides the frame, an upper bound.
 const BYTES: u64 = 400;
-
-/// Share of the mean variance around it that a colour's variance is raised to.
-const FLOOR: f32 = 0.5;
 
 fn make(parameters: &Parameters) -> Result<Box<dyn Reconstruction>> {
     let radius = |name| parameters.get(name, "a number from 1 to 12", |radius| (1..=12).contains(radius));
@@ -44,9 +41,8 @@ impl Reconstruction for Rdfc {
     fn reconstruct(&self, frame: &Frame, context: &Context) -> Result<Solution> {
         let inputs = Inputs::new(frame, 1)?;
         check_memory(frame, context, METHOD.id, BYTES)?;
-        let [mean, variance] = inputs.color()?;
+        let color = inputs.guide()?;
         let features = [Feature::of(Kind::Albedo, &inputs)?.guide(), Feature::of(Kind::Normal, &inputs)?.guide()];
-        let color = Guide { mean, variance: raise(&variance.sum(), FLOOR), tolerance: None };
         let options = Options { window: self.window, symmetric: false, choice: self.choice, rows: frame.height };
         let report = |share| (context.progress)("denoise", share);
         let Denoised { image, error } = rdfc::denoise(&Guides { color, features: features.into() }, options, &report);

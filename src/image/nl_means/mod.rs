@@ -59,11 +59,10 @@ pub fn filter(values: &Planes, guides: &Guides, settings: Settings) -> Planes {
 /// blocks the offsets follow each other, row by row, with a weight for every pixel. Those outside the image have none.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
 pub fn weights(guide: &Guide, settings: Settings, tile: Tile) -> Vec<f32> {
-    let r = settings.window as isize;
     let offsets = (2 * settings.window + 1).pow(2);
     let mut weights = vec![0.0; offsets * tile.height * tile.width.next_multiple_of(LANES)];
     let mut patches = Patches::new(tile, settings.patch, 1);
-    for (k, (dx, dy)) in (-r..=r).flat_map(|dy| (-r..=r).map(move |dx| (dx, dy))).enumerate() {
+    for (k, (dx, dy)) in window(settings.window).enumerate() {
         patches.compare(guide, Other::At(dx, dy), settings.color * settings.color, &[settings.patch]);
         for (block, (x, y)) in tile.blocks().enumerate() {
             let distance = patches.mean(0, settings.patch, x, y).max(Lanes::ZERO);
@@ -83,10 +82,15 @@ pub fn weights(guide: &Guide, settings: Settings, tile: Tile) -> Vec<f32> {
     weights
 }
 
+/// Offsets of a window, row by row.
+fn window(radius: usize) -> impl Iterator<Item = (isize, isize)> {
+    let r = radius as isize;
+    (-r..=r).flat_map(move |dy| (-r..=r).map(move |dx| (dx, dy)))
+}
+
 /// Offsets of a window except the centre.
 fn offsets(radius: usize) -> impl Iterator<Item = (isize, isize)> {
-    let r = radius as isize;
-    (-r..=r).flat_map(move |dy| (-r..=r).map(move |dx| (dx, dy))).filter(|&offset| offset != (0, 0))
+    window(radius).filter(|&offset| offset != (0, 0))
 }
 
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]

@@ -8,6 +8,7 @@ use super::form::Form;
 use super::level::Level;
 use crate::image::planes::Planes;
 use crate::math::rng;
+use crate::reconstruct::inputs::quads;
 use crate::solve::graph::Quad;
 use crate::solve::poisson::{Data, Weights};
 
@@ -59,14 +60,11 @@ pub fn enhance(level: &Level, denoised: &Planes, error: &Planes, form: Form, spp
     let edges = [edges(0), edges(1)];
     let [across, down]: [Vec<f32>; 2] = [0, 1].map(|axis: usize| edges[axis].par_iter().map(Weight::sum).collect());
     let screen: Vec<f32> = pixels().map(|at| screen(level, error, form, spp, at)).collect();
-    let quads = |planes: &Planes| -> Vec<Quad> {
-        pixels().map(|(x, y)| [planes.at(0, x, y), planes.at(1, x, y), planes.at(2, x, y), 0.0]).collect()
-    };
-    let data = quads(denoised);
+    let data = quads(denoised, 0);
     // A sampled difference and one of zero together pull like their mean.
     let pull = |axis: usize| -> Vec<Quad> {
         let share = edges[axis].par_iter().map(|weight| weight.sampled / weight.sum());
-        let sampled = quads(&level.gradients[axis]);
+        let sampled = quads(&level.gradients[axis], 0);
         sampled.into_par_iter().zip(share).map(|(edge, share)| edge.map(|value| share * value)).collect()
     };
     let weights = Weights { across, down, screen };

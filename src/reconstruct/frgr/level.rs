@@ -2,7 +2,7 @@
 
 use crate::image::planes::Planes;
 use crate::reconstruct::features::Feature;
-use crate::reconstruct::inputs::raise;
+use crate::reconstruct::inputs::{FLOOR, raise};
 
 /// Means and variances of the means, radiance in units of its typical luminance.
 pub struct Level {
@@ -18,14 +18,13 @@ pub struct Level {
     pub features: Vec<Feature>,
 }
 
-/// Shares of the mean variance around them that the variances of a colour and of a difference are raised to.
-const COLOR_FLOOR: f32 = 0.5;
+/// Share of the mean variance around it that a difference's variance is raised to.
 const GRADIENT_FLOOR: f32 = 0.25;
 
 impl Level {
     /// The same with variances raised to a share of those around them.
     pub fn without_certainty(self) -> Self {
         let noise = [raise(&self.noise[0], GRADIENT_FLOOR), raise(&self.noise[1], GRADIENT_FLOOR)];
-        Self { variance: raise(&self.variance, COLOR_FLOOR), noise, ..self }
+        Self { variance: raise(&self.variance, FLOOR), noise, ..self }
     }
 }

@@ -7,7 +7,7 @@
 mod regression;
 
 use self::regression::regress;
-use super::inputs::{Inputs, check_memory, raise};
+use super::inputs::{FLOOR, Inputs, check_memory, raise};
 use super::{Context, Method, Parameter, Parameters, Reconstruction, Solution};
 use crate::error::Result;
 use crate::film::{Frame, Layer, Needs};
@@ -28,9 +28,6 @@ pub const METHOD: Method = Method {
 
 /// Bytes held for every pixel besides the frame, an upper bound.
 const BYTES: u64 = 700;
-
-/// Share of the mean variance around it that a colour's variance is raised to.
-const FLOOR: f32 = 0.5;
 
 fn make(parameters: &Parameters) -> Result<Box<dyn Reconstruction>> {
     let k = parameters.get("k", "a number in [0.01, 100]", |k| (0.01..=100.0).contains(k))?;
@@ -99,8 +96,7 @@ impl Reconstruction for Nfor {
 }
 
 /// Estimated squared error of the mean of two filtered halves, sum over the channels: how far each is from the half it
-/// has not seen, less that half's own variance, which is
-/// twice that of all samples, less what their mean gains.
+/// has not seen, less that half's own variance, which is twice that of all samples, less what their mean gains.
 fn error(halves: &[Planes; 2], filtered: &[Planes; 2], variance: &Planes) -> Planes {
     let square = |a: &Planes, b: &Planes| a.zip(b, |a, b| (a - b) * (a - b)).sum();
     let sum = square(&halves[1], &filtered[0]).zip(&square(&halves[0], &filtered[1]), |a, b| 0.5 * (a + b));
