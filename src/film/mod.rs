@@ -10,7 +10,7 @@ mod sample;
 pub use self::frame::Frame;
 pub use self::layer::Layer;
 use self::sample::Moments;
-pub use self::sample::{EDGES, Features, Rejected, Sample};
+pub use self::sample::{EDGES, Features, Rejected, Sample, bin_count};
 use crate::math::Rgb;
 
 /// Samples are dealt in turn to this many groups, whose statistics are independent of each other.

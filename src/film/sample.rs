@@ -62,7 +62,7 @@ pub(super) fn flatten(edges: &[Rgb; 4]) -> [f32; 12] {
 }
 
 /// Samples in bin `k` of a pixel that has `n`.
-pub(super) fn bin_count(n: u32, k: usize) -> u32 {
+pub fn bin_count(n: u32, k: usize) -> u32 {
     (n + (BINS - 1 - k) as u32) / BINS as u32
 }
 

@@ -65,6 +65,16 @@ impl Lanes {
         self.zip(other, |a, b| if a > b { a } else { b })
     }
 
+    /// The sum of all.
+    #[inline(always)]
+    pub fn sum(self) -> f32 {
+        let mut sums = [0.0; 4];
+        for (i, value) in self.0.into_iter().enumerate() {
+            sums[i % 4] += value;
+        }
+        (sums[0] + sums[1]) + (sums[2] + sums[3])
+    }
+
     /// Square roots.
     #[inline(always)]
     pub fn sqrt(self) -> Self {
@@ -150,6 +160,7 @@ mod tests {
             assert_eq!(a.where_greater(a, b, b).0[i], x.max(4.0));
             assert_eq!(a.sqrt().0[i], x.sqrt());
         }
+        assert_eq!(a.sum(), 120.0);
         assert_eq!(Lanes::splat(f32::NAN).max(b), b);
     }
 }

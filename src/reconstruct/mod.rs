@@ -1,8 +1,11 @@
 //! Reconstructions: methods that make an image of a frame.
 
+mod apr;
 mod control_variate;
+mod feature;
 mod features;
 mod frgr;
+mod generated;
 mod inputs;
 mod l1;
 mod l2;
@@ -93,6 +96,8 @@ pub const METHODS: &[Method] = &[
     rdfc::METHOD,
     nfor::METHOD,
     frgr::METHOD,
+    feature::METHOD,
+    apr::METHOD,
     #[cfg(feature = "oidn")]
     oidn::METHOD,
 ];

@@ -80,6 +80,15 @@ impl Multigrid {
         Self { levels, coarsest: finest, factor }
     }
 
+    /// Solves for another matrix of the same size from now on. Coarser versions stay those of the old one: good as long as
+    /// strong edges stay strong.
+    pub fn replace(&mut self, graph: Graph) {
+        match self.levels.first_mut() {
+            Some(level) => level.graph = graph,
+            None => *self = Self::new(graph),
+        }
+    }
+
     fn graph(&self, level: usize) -> &Graph {
         self.levels.get(level).map_or(&self.coarsest, |level| &level.graph)
     }

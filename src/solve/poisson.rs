@@ -79,7 +79,12 @@ impl Weights {
 
     /// The solver of the normal equations.
     pub fn solver(&self, width: usize) -> Multigrid {
-        Multigrid::new(Graph::from_grid(width, &self.across, &self.down, &self.screen))
+        Multigrid::new(self.graph(width))
+    }
+
+    /// The matrix of the normal equations.
+    pub fn graph(&self, width: usize) -> Graph {
+        Graph::from_grid(width, &self.across, &self.down, &self.screen)
     }
 }
 

@@ -55,6 +55,14 @@ pub fn filter(values: &Planes, guides: &Guides, settings: Settings) -> Planes {
     })
 }
 
+/// An image cleaned of its own noise, as auxiliary ones are: windows of 11x11 pixels, patches of 7x7.
+pub fn clean(noisy: &Guide, tolerance: f32) -> Planes {
+    let Guide { mean, variance, tolerance: limit } = noisy;
+    let color = Guide { mean: mean.clone(), variance: variance.clone(), tolerance: limit.clone() };
+    let settings = Settings { window: 5, patch: 3, color: tolerance, feature: None };
+    filter(mean, &Guides { color, features: Vec::new() }, settings)
+}
+
 /// Weights of a tile's pixels for those of their windows, centres included, by colour alone. For each of the tile's
 /// blocks the offsets follow each other, row by row, with a weight for every pixel. Those outside the image have none.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]

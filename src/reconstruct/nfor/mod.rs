@@ -115,9 +115,7 @@ fn features(inputs: &Inputs) -> Result<Planes> {
     let mut all: Option<Planes> = None;
     for (mean, variance, scale) in layers {
         let (mean, variance) = (inputs.planes(mean, scale)?, inputs.planes(variance, scale * scale)?.sum());
-        let color = Guide { mean: mean.clone(), variance, tolerance: None };
-        let settings = Settings { window: 5, patch: 3, color: 0.5, feature: None };
-        let clean = nl_means::filter(&mean, &Guides { color, features: Vec::new() }, settings);
+        let clean = nl_means::clean(&Guide { mean, variance, tolerance: None }, 0.5);
         all = Some(all.map_or_else(|| clean.clone(), |all| all.and(&clean)));
     }
     Ok(all.expect("there are three"))

@@ -1,0 +1,42 @@
+//! The feature generated from differences, as an image: a screened Poisson reconstruction in which everything counts by
+//! its variance, cleaned of what noise is left.
+
+use super::generated::{self, Options};
+use super::inputs::{Inputs, check_memory};
+use super::{Context, Method, Parameters, Reconstruction, Solution};
+use crate::error::Result;
+use crate::film::{Frame, Needs};
+
+/// `feature`.
+pub const METHOD: Method = Method {
+    id: "feature",
+    summary: "Poisson reconstruction weighted by variances, bagged and cleaned: what `apr` takes as a feature; consistent",
+    parameters: &[generated::ROUNDS, generated::SCREEN, generated::VARIANCES, generated::PREFILTER],
+    make,
+};
+
+/// Bytes held for every pixel besides the frame, an upper bound.
+const BYTES: u64 = 600;
+
+fn make(parameters: &Parameters) -> Result<Box<dyn Reconstruction>> {
+    Ok(Box::new(Feature { options: Options::new(parameters)? }))
+}
+
+struct Feature {
+    options: Options,
+}
+
+impl Reconstruction for Feature {
+    fn needs(&self) -> Needs {
+        Needs { features: self.options.needs_features(), edges: true, bins: true }
+    }
+
+    fn reconstruct(&self, frame: &Frame, context: &Context) -> Result<Solution> {
+        let inputs = Inputs::new(frame, 1)?;
+        check_memory(frame, context, METHOD.id, BYTES)?;
+        let report = |share| (context.progress)("feature", share);
+        let feature = generated::feature(&inputs, &self.options, &report)?;
+        let image = feature.to_image(frame.width, frame.height, 1.0 / inputs.scale);
+        Ok(Solution { image, error: None, notes: Vec::new() })
+    }
+}

@@ -1,0 +1,258 @@
+//! A feature made of the differences (Back et al. 2018): the image whose differences are the sampled ones, as far as
+//! they can be trusted. It has every edge that the image has, those of shadows and reflections too.
+//!
+//! Differences are weighted by one over their variance, and the groups of samples are drawn again and again with
+//! replacement; each draw is solved for (bagging). How far the solutions are apart is the feature's variance, by which
+//! non-local means clean what noise is left.
+
+use rayon::prelude::*;
+
+use super::features::{Feature, Kind};
+use super::inputs::Inputs;
+use super::{Parameter, Parameters};
+use crate::error::Result;
+use crate::film::{BINS, Layer, bin_count};
+use crate::image::nl_means::{self, Guide, Guides, rdfc};
+use crate::image::planes::Planes;
+use crate::math::rng;
+use crate::solve::graph::Quad;
+use crate::solve::poisson::{Data, Weights};
+
+/// How the feature is made.
+#[derive(Clone, Debug)]
+pub struct Options {
+    rounds: u32,
+    screen: f32,
+    variances: Variances,
+    prefilter: Prefilter,
+}
+
+/// What differences are weighted by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Variances {
+    /// Of all samples, averaged over 3x3 pixels; the same in every round.
+    Samples,
+    /// Of the groups that were drawn, pixel by pixel.
+    Draws,
+}
+
+/// What cleans the feature.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Prefilter {
+    Off,
+    /// Non-local means by the feature alone.
+    NonLocalMeans,
+    /// Filters by the feature, albedo and normal.
+    Rdfc,
+}
+
+/// Parameters of methods that generate the feature.
+pub const ROUNDS: Parameter = Parameter { name: "rounds", default: "10", summary: "draws of the groups, 2 to 100" };
+/// See [`ROUNDS`].
+pub const SCREEN: Parameter = Parameter {
+    name: "screen",
+    default: "1",
+    summary: "weight of the colour against the differences, both by their variances, 0 to 1; 0 as published",
+};
+/// See [`ROUNDS`].
+pub const VARIANCES: Parameter = Parameter {
+    name: "variances",
+    default: "samples",
+    summary: "whose variances weigh: of all samples, averaged over 3x3 pixels; or of the draws, as published",
+};
+/// See [`ROUNDS`].
+pub const PREFILTER: Parameter = Parameter {
+    name: "prefilter",
+    default: "rdfc",
+    summary: "what cleans the feature: rdfc by albedo and normal too, nlm by itself as published, or off",
+};
+
+impl Options {
+    /// Reads the parameters.
+    pub fn new(parameters: &Parameters) -> Result<Self> {
+        let variances = parameters.choice(VARIANCES.name, &["samples", "draws"])?;
+        let prefilter = parameters.choice(PREFILTER.name, &["rdfc", "nlm", "off"])?;
+        Ok(Self {
+            rounds: parameters.get(ROUNDS.name, "a number from 2 to 100", |n| (2..=100).contains(n))?,
+            screen: parameters.get(SCREEN.name, "a number in [0, 1]", |n| (0.0..=1.0).contains(n))?,
+            variances: if variances == "samples" { Variances::Samples } else { Variances::Draws },
+            prefilter: match prefilter.as_str() {
+                "rdfc" => Prefilter::Rdfc,
+                "nlm" => Prefilter::NonLocalMeans,
+                _ => Prefilter::Off,
+            },
+        })
+    }
+
+    /// Whether albedo and normal are asked for.
+    pub fn needs_features(&self) -> bool {
+        self.prefilter == Prefilter::Rdfc
+    }
+
+    /// The same without albedo and normal.
+    pub fn without_features(self) -> Self {
+        let prefilter = if self.needs_features() { Prefilter::NonLocalMeans } else { self.prefilter };
+        Self { prefilter, ..self }
+    }
+}
+
+/// What variances are raised by, in units of the typical luminance squared.
+const FLOOR: f32 = 1e-4;
+
+/// Least screening, which keeps the mean where it is.
+const PIN: f32 = 1e-5;
+
+/// Residuals of the first problem are brought down to this share, and those of the rounds, which start at its solution
+/// and tell variances only.
+const TOLERANCE: f64 = 1e-3;
+const ROUGHLY: f64 = 0.5;
+
+/// Filters trust variances of solutions too much: their errors are alike at neighbouring pixels, whose distances are
+/// averaged as if they were not.
+const CORRELATION: f32 = 3.0;
+
+/// The cleaned feature, in units of [`Inputs::scale`].
+pub fn feature(inputs: &Inputs, options: &Options, progress: &dyn Fn(f32)) -> Result<Planes> {
+    let raw = bagged(inputs, options, progress)?;
+    let size = raw.mean.height;
+    Ok(match options.prefilter {
+        Prefilter::Off => raw.mean,
+        Prefilter::NonLocalMeans => nl_means::clean(&raw, 1.0),
+        Prefilter::Rdfc => {
+            let color = Guide { variance: raw.variance.map(|variance| CORRELATION * variance), ..raw };
+            let features = [Feature::of(Kind::Albedo, inputs)?.guide(), Feature::of(Kind::Normal, inputs)?.guide()];
+            let of_filter = rdfc::Options { window: 5, symmetric: false, choice: 2, rows: size };
+            rdfc::denoise(&Guides { color, features: features.into() }, of_filter, &|_| ()).image
+        }
+    })
+}
+
+/// The feature and the variance of its mean, sum over the channels.
+fn bagged(inputs: &Inputs, options: &Options, progress: &dyn Fn(f32)) -> Result<Guide> {
+    let (width, height) = (inputs.frame.width, inputs.frame.height);
+    let groups = Groups::of(inputs)?;
+    let (all, mut weights) = match options.variances {
+        Variances::Samples => (groups.draw(&[[1; BINS]; 3]).0, weights(&of_samples(inputs)?, options.screen)),
+        Variances::Draws => {
+            let (means, variances) = groups.draw(&[[1; BINS]; 3]);
+            (means, weights(&variances, options.screen))
+        }
+    };
+    let mut solver = weights.solver(width);
+    let [color, dx, dy] = all;
+    let right = weights.right(Data { width, data: &color, edges: [&dx, &dy] });
+    let whole = solver.solve(&right, color, TOLERANCE).x;
+    let mut sums: Vec<Quad> = vec![[0.0; 4]; whole.len()];
+    for round in 0..options.rounds {
+        let ([color, dx, dy], variances) = groups.draw(&[0, 1, 2].map(|which| draw(round, which)));
+        if options.variances == Variances::Draws {
+            weights = self::weights(&variances, options.screen);
+            solver.replace(weights.graph(width));
+        }
+        let right = weights.right(Data { width, data: &color, edges: [&dx, &dy] });
+        let solution = solver.solve(&right, whole.clone(), ROUGHLY).x;
+        // How far it is off, with the squares of that in the fourth place.
+        sums.par_iter_mut().zip(&solution).zip(&whole).for_each(|((sum, solution), whole)| {
+            let off = [0, 1, 2].map(|c| solution[c] - whole[c]);
+            (0..3).for_each(|c| sum[c] += off[c]);
+            sum[3] += off.iter().map(|off| off * off).sum::<f32>();
+        });
+        progress((round + 1) as f32 / options.rounds as f32);
+    }
+    let rounds = options.rounds as f32;
+    // With the same weights in all rounds their mean is the solution of all samples, and some noise.
+    let share = if options.variances == Variances::Draws { 1.0 / rounds } else { 0.0 };
+    let mean = Planes::from_fn(width, height, 3, |c, x, y| whole[y * width + x][c] + share * sums[y * width + x][c]);
+    // Draws of n out of n vary by n - 1 of n parts of what samples do.
+    let scale = BINS as f32 / (BINS as f32 - 1.0) / (rounds - 1.0);
+    let variance = Planes::from_fn(width, height, 1, |_, x, y| {
+        let [r, g, b, squares] = sums[y * width + x];
+        scale * (squares - (r * r + g * g + b * b) / rounds).max(0.0)
+    });
+    Ok(Guide { mean, variance, tolerance: None })
+}
+
+/// Weights of colour and differences with these variances.
+fn weights([color, dx, dy]: &[Vec<f32>; 3], screen: f32) -> Weights {
+    let weigh = |variances: &[f32], weight: f32| variances.par_iter().map(|v| weight / (v + FLOOR)).collect();
+    Weights { across: weigh(dx, 1.0), down: weigh(dy, 1.0), screen: weigh(color, screen.max(PIN)) }
+}
+
+/// Variances of colour and differences, sums over the channels, averaged over 3x3 pixels: those of single pixels are
+/// small where outliers happen to be missing, and follow what they are to weigh.
+fn of_samples(inputs: &Inputs) -> Result<[Vec<f32>; 3]> {
+    let smooth = |layer| {
+        let variance = inputs.planes(layer, inputs.scale * inputs.scale)?.sum().box_mean(1);
+        Ok(variance.to_image(inputs.frame.width, inputs.frame.height, 1.0).data)
+    };
+    Ok([smooth(Layer::ColorVariance)?, smooth(Layer::DxVariance)?, smooth(Layer::DyVariance)?])
+}
+
+/// How often each group is drawn.
+type Draw = [u32; BINS];
+
+/// As many groups as there are, drawn with replacement; the same for all pixels, so that errors of neighbours stay as
+/// they are.
+fn draw(round: u32, which: u64) -> Draw {
+    let mut draw = [0; BINS];
+    for k in 0..BINS as u64 {
+        let u = rng::unit(rng::combine(rng::combine(u64::from(round), which), k));
+        draw[((u * BINS as f32) as usize).min(BINS - 1)] += 1;
+    }
+    draw
+}
+
+/// The samples of colour and differences in groups.
+struct Groups<'a> {
+    /// For each of the three, the groups' images and the step to the pixel that it also takes samples of.
+    layers: [(Vec<&'a [f32]>, usize); 3],
+    counts: &'a [f32],
+    scale: f32,
+}
+
+impl<'a> Groups<'a> {
+    fn of(inputs: &Inputs<'a>) -> Result<Self> {
+        let images = |layer: fn(u8) -> Layer| {
+            let image = |k| Ok(inputs.frame.require(layer(k))?.data.as_slice());
+            (0..BINS as u8).map(image).collect::<Result<Vec<_>>>()
+        };
+        Ok(Self {
+            layers: [
+                (images(Layer::BinColor)?, 0),
+                (images(Layer::BinDx)?, 1),
+                (images(Layer::BinDy)?, inputs.frame.width),
+            ],
+            counts: &inputs.frame.require(Layer::Samples)?.data,
+            scale: inputs.scale,
+        })
+    }
+
+    /// Means of the drawn groups, and their variances, sums over the channels.
+    fn draw(&self, draws: &[Draw; 3]) -> ([Vec<Quad>; 3], [Vec<f32>; 3]) {
+        let of = |which: usize| -> (Vec<Quad>, Vec<f32>) {
+            (0..self.counts.len()).into_par_iter().map(|i| self.pixel(which, &draws[which], i)).unzip()
+        };
+        let [(color, of_color), (dx, of_dx), (dy, of_dy)] = [of(0), of(1), of(2)];
+        ([color, dx, dy], [of_color, of_dx, of_dy])
+    }
+
+    fn pixel(&self, which: usize, draw: &Draw, i: usize) -> (Quad, f32) {
+        let (images, step) = &self.layers[which];
+        let Some(&far) = self.counts.get(i + step) else { return ([0.0; 4], 0.0) };
+        let samples = self.counts[i].min(far) as u32;
+        let counts: Draw = std::array::from_fn(|k| bin_count(samples, k));
+        let drawn: Draw = std::array::from_fn(|k| if counts[k] > 0 { draw[k] } else { 0 });
+        // With fewer samples than groups a draw may be empty; then it is as if all were drawn.
+        let drawn = if drawn == [0; BINS] { counts.map(|count| count.min(1)) } else { drawn };
+        let weights: [f32; BINS] = std::array::from_fn(|k| (drawn[k] * counts[k]) as f32);
+        let share = 1.0 / weights.iter().sum::<f32>().max(1.0);
+        let (mut mean, mut squares) = ([0.0; 4], 0.0);
+        for c in 0..3 {
+            let values: [f32; BINS] = std::array::from_fn(|k| images[k][3 * i + c] * self.scale);
+            mean[c] = share * (0..BINS).map(|k| weights[k] * values[k]).sum::<f32>();
+            squares += (0..BINS).map(|k| weights[k] * (values[k] - mean[c]).powi(2)).sum::<f32>();
+        }
+        let groups: u32 = drawn.iter().sum();
+        (mean, share * squares / (groups as f32 - 1.0).max(1.0))
+    }
+}
