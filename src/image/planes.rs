@@ -212,6 +212,18 @@ impl Planes {
         across(&across(self, (1, 0)), (0, 1))
     }
 
+    /// Medians over squares of the given radius, at most 3, around every pixel.
+    pub fn median(&self, radius: usize) -> Self {
+        let r = radius as isize;
+        let count = (2 * radius + 1) * (2 * radius + 1);
+        Self::from_fn(self.width, self.height, self.channels(), |c, x, y| {
+            let mut around = [0.0; 49];
+            let rows = around[..count].chunks_exact_mut(2 * radius + 1).zip(y as isize - r..);
+            rows.for_each(|(row, y)| row.copy_from_slice(self.span(c, x as isize - r, y, 2 * radius + 1)));
+            *around[..count].select_nth_unstable_by(count / 2, f32::total_cmp).1
+        })
+    }
+
     /// `count` of the planes from `first` on.
     pub fn part(&self, first: usize, count: usize) -> Self {
         Self { planes: self.planes[first..first + count].to_vec(), ..*self }

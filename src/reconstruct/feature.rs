@@ -6,6 +6,7 @@ use super::inputs::{Inputs, check_memory};
 use super::{Context, Method, Parameters, Reconstruction, Solution};
 use crate::error::Result;
 use crate::film::{Frame, Needs};
+use crate::image::planes::Planes;
 
 /// `feature`.
 pub const METHOD: Method = Method {
@@ -35,8 +36,14 @@ impl Reconstruction for Feature {
         let inputs = Inputs::new(frame, 1)?;
         check_memory(frame, context, METHOD.id, BYTES)?;
         let report = |share| (context.progress)("feature", share);
-        let feature = generated::feature(&inputs, &self.options, &report)?;
-        let image = feature.to_image(frame.width, frame.height, 1.0 / inputs.scale);
-        Ok(Solution { image, error: None, notes: Vec::new() })
+        let [feature, variance] = generated::feature(&inputs, &self.options, &report)?;
+        let (width, height) = (frame.width, frame.height);
+        let error = generated::error(&variance, &Planes::new(width, height, 1));
+        let of_value = Planes::from_fn(width, height, 3, |_, x, y| error.at(0, x as isize, y as isize) / 3.0);
+        Ok(Solution {
+            image: feature.to_image(width, height, 1.0 / inputs.scale),
+            error: Some(of_value.to_image(width, height, 1.0 / (inputs.scale * inputs.scale))),
+            notes: Vec::new(),
+        })
     }
 }

@@ -123,12 +123,14 @@ impl Reconstruction for Apr {
     fn reconstruct(&self, frame: &Frame, context: &Context) -> Result<Solution> {
         let inputs = Inputs::new(frame, 1)?;
         check_memory(frame, context, METHOD.id, BYTES)?;
-        let features = self.features(&inputs, &|share| (context.progress)("features", share))?;
         let size = (frame.width, frame.height);
-        let features = features.map_or_else(|| Blocks::from_fn(size, 0, |_, _, _| 0.0), |planes| Blocks::new(&planes));
+        let Features { planes, variance: of_feature } =
+            self.features(&inputs, &|share| (context.progress)("features", share))?;
+        let features = planes.map_or_else(|| Blocks::from_fn(size, 0, |_, _, _| 0.0), |planes| Blocks::new(&planes));
         let [sampled, variance] = inputs.color()?;
         let color = self.outliers.map_or_else(|| sampled.clone(), |limit| outliers::spread(&sampled, limit));
-        let smooth = variance.sum().box_mean(SMOOTHING);
+        let own = variance.sum();
+        let smooth = own.box_mean(SMOOTHING);
         let weight = Blocks::from_fn(size, 1, |_, x, y| {
             let inside = x < size.0 && y < size.1;
             if inside { 1.0 / (smooth.at(0, x as isize, y as isize) + LEAST) } else { 0.0 }
@@ -142,16 +144,27 @@ impl Reconstruction for Apr {
             (context.progress)("predict", stage as f32 / self.stages as f32);
             result = candidates.predict(Some(&result));
         }
-        let predicted = [result.planes(size, 0, 3), result.planes(size, LEVERAGE, 1)];
-        Ok(blend([sampled, variance], predicted, &inputs))
+        let prediction = result.planes(size, 0, 3);
+        let leverage = result.planes(size, LEVERAGE, 1).map(|leverage| leverage.min(1.0));
+        Ok(Blend { color: sampled, own, prediction, leverage, of_feature }.solution(&inputs))
     }
+}
+
+/// What colours are linear in.
+#[derive(Default)]
+struct Features {
+    planes: Option<Planes>,
+    /// Variance of the generated one, sum over its channels.
+    variance: Option<Planes>,
 }
 
 impl Apr {
     /// All features, cleaned, if there are any.
-    fn features(&self, inputs: &Inputs, progress: &dyn Fn(f32)) -> Result<Option<Planes>> {
-        let mut all: Option<Planes> = None;
-        let mut add = |planes: Planes| all = Some(all.as_ref().map_or_else(|| planes.clone(), |all| all.and(&planes)));
+    fn features(&self, inputs: &Inputs, progress: &dyn Fn(f32)) -> Result<Features> {
+        let mut features = Features::default();
+        let mut add = |planes: Planes| {
+            features.planes = Some(features.planes.take().map_or_else(|| planes.clone(), |all| all.and(&planes)));
+        };
         for &(_, mean, variance) in self.layers.iter().map(|&k| &LAYERS[k]) {
             let largest = inputs.frame.require(mean)?.data.iter().fold(1.0, |most: f32, value| most.max(value.abs()));
             let mean = inputs.planes(mean, 1.0 / largest)?;
@@ -159,45 +172,62 @@ impl Apr {
             add(nl_means::clean(&Guide { mean, variance, tolerance: None }, 0.5));
         }
         if let Some(options) = &self.generated {
-            add(generated::feature(inputs, options, progress)?);
+            let [mean, variance] = generated::feature(inputs, options, progress)?;
+            add(mean);
+            features.variance = Some(variance);
         }
-        Ok(all)
+        Ok(features)
     }
 }
 
-/// The mean of prediction and sampled colour by their errors. That of the prediction is estimated without bias from its
-/// distance to the sampled colour (Stein 1981) and smoothed.
-fn blend([color, variance]: [Planes; 2], [image, leverage]: [Planes; 2], inputs: &Inputs) -> Solution {
-    let (width, height) = (color.width, color.height);
-    let own = variance.sum();
-    let square = color.zip(&image, |a, b| (a - b) * (a - b)).sum();
-    let at = |planes: &Planes, x: usize, y: usize| planes.at(0, x as isize, y as isize);
-    let error = Planes::from_fn(width, height, 1, |_, x, y| {
-        at(&square, x, y) - at(&own, x, y) * (1.0 - 2.0 * at(&leverage, x, y).min(1.0))
-    });
-    let guide = Guide { mean: color.clone(), variance: raise(&own, FLOOR), tolerance: None };
-    let settings = Settings { window: 8, patch: 3, color: 1.0, feature: None };
-    let smooth = nl_means::filter(&error.and(&own), &Guides { color: guide, features: Vec::new() }, settings);
-    // Share of the sampled colour, and the error of the mean of both.
-    let shares = Planes::from_fn(width, height, 2, |c, x, y| {
-        let (x, y) = (x as isize, y as isize);
-        let (error, own) = (smooth.at(0, x, y), smooth.at(1, x, y));
-        let leverage = leverage.at(0, x, y).min(1.0);
-        let error = error.max(leverage * own).max(0.0);
-        // Squares, so that the better one has nearly all the weight.
-        let share = if error > 0.0 { error * error / (error * error + own * own) } else { 0.0 };
-        let rest = 1.0 - share;
-        [share, rest * rest * error + share * (share + 2.0 * rest * leverage) * own][c]
-    });
-    let value = |c, x, y| {
-        let share = shares.at(0, x, y);
-        share * color.at(c, x, y) + (1.0 - share) * image.at(c, x, y)
-    };
-    let mixed = Planes::from_fn(width, height, 3, |c, x, y| value(c, x as isize, y as isize));
-    let of_value = Planes::from_fn(width, height, 3, |_, x, y| shares.at(1, x as isize, y as isize) / 3.0);
-    Solution {
-        image: mixed.to_image(width, height, 1.0 / inputs.scale),
-        error: Some(of_value.to_image(width, height, 1.0 / (inputs.scale * inputs.scale))),
-        notes: Vec::new(),
+/// The mean of prediction and sampled colour, each by its error.
+struct Blend {
+    color: Planes,
+    /// Variance of the colour, sum over the channels.
+    own: Planes,
+    prediction: Planes,
+    leverage: Planes,
+    of_feature: Option<Planes>,
+}
+
+impl Blend {
+    fn solution(&self, inputs: &Inputs) -> Solution {
+        let (width, height) = (self.color.width, self.color.height);
+        let [unbiased, smooth] = self.errors();
+        let spread = self.own.zip(&self.leverage, |own, leverage| own * leverage);
+        let error = self.of_feature.as_ref().map_or_else(|| unbiased.clone(), |of| generated::error(of, &spread));
+        // Share of the sampled colour, and the error of the mean of both.
+        let shares = Planes::from_fn(width, height, 2, |c, x, y| {
+            let (x, y) = (x as isize, y as isize);
+            let (own, leverage) = (smooth.at(0, x, y), self.leverage.at(0, x, y));
+            let unbiased = unbiased.at(0, x, y).max(leverage * own);
+            // Squares, so that the better one has nearly all the weight.
+            let share = if unbiased > 0.0 { unbiased.powi(2) / (unbiased.powi(2) + own.powi(2)) } else { 0.0 };
+            let (rest, error) = (1.0 - share, error.at(0, x, y).max(leverage * own));
+            [share, rest * rest * error + share * (share + 2.0 * rest * leverage) * own][c]
+        });
+        let value = |c, x, y| {
+            let share = shares.at(0, x, y);
+            share * self.color.at(c, x, y) + (1.0 - share) * self.prediction.at(c, x, y)
+        };
+        let image = Planes::from_fn(width, height, 3, |c, x, y| value(c, x as isize, y as isize));
+        let of_value = Planes::from_fn(width, height, 3, |_, x, y| shares.at(1, x as isize, y as isize) / 3.0);
+        Solution {
+            image: image.to_image(width, height, 1.0 / inputs.scale),
+            error: Some(of_value.to_image(width, height, 1.0 / (inputs.scale * inputs.scale))),
+            notes: Vec::new(),
+        }
+    }
+
+    /// The prediction's squared error, estimated without bias from its distance to the sampled colour (Stein 1981), and the
+    /// colour's variance, both smoothed.
+    fn errors(&self) -> [Planes; 2] {
+        let square = self.color.zip(&self.prediction, |a, b| (a - b) * (a - b)).sum();
+        let known = self.own.zip(&self.leverage, |own, leverage| own * (1.0 - 2.0 * leverage));
+        let error = square.zip(&known, |square, known| square - known);
+        let color = Guide { mean: self.color.clone(), variance: raise(&self.own, FLOOR), tolerance: None };
+        let settings = Settings { window: 8, patch: 3, color: 1.0, feature: None };
+        let smooth = nl_means::filter(&error.and(&self.own), &Guides { color, features: Vec::new() }, settings);
+        [smooth.part(0, 1), smooth.part(1, 1)]
     }
 }
