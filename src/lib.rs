@@ -24,6 +24,7 @@ pub mod render;
 
 pub mod metrics;
 pub mod reconstruct;
+pub mod adaptive;
 pub mod reference;
 pub mod validate;
 

@@ -60,7 +60,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     if let Some(path) = &args.map {
         let map = metric.measure(&images[0], &reference)?.map;
         let map = map.ok_or_else(|| Error::Usage(format!("metric `{}` has no map", args.metric)))?;
-        io::write_color(path, &heat(&map, None), None, &[])?;
+        io::write_color(path, &heat(&map, None), &[], &[])?;
     }
     match (&json_file, to_stdout) {
         (None, false) => objects.iter().zip(paths).for_each(|(object, path)| print(object, path)),

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use anyhow::{Context as _, Result};
 use fluxion::error::Error;
-use fluxion::film::Frame;
+use fluxion::film::{Frame, Layer};
 use fluxion::image::io;
 use fluxion::reconstruct::{self, Context, Reconstruction, Solution};
 
@@ -50,28 +50,41 @@ impl Args {
             bar.set_message(what.to_owned());
             progress::set(&bar, share);
         };
-        let memory = self.max_memory.map(|megabytes| megabytes << 20);
-        let context = Context { progress: &report, memory, notes: self.notes.is_some() };
-        let solution = reconstruct::solve(method, frame, &context)?;
+        let solution = reconstruct::solve(method, frame, &self.context(&report))?;
         bar.finish_and_clear();
         stats.seconds.reconstruct = start.elapsed().as_secs_f64();
+        self.write_notes(&solution, frame)?;
+        Ok(solution)
+    }
+
+    /// What a reconstruction is given.
+    pub fn context<'a>(&self, progress: &'a dyn Fn(&str, f32)) -> Context<'a> {
+        Context { progress, memory: self.max_memory.map(|megabytes| megabytes << 20), notes: self.notes.is_some() }
+    }
+
+    /// Writes intermediate images, if they are asked for.
+    pub fn write_notes(&self, solution: &Solution, frame: &Frame) -> Result<()> {
         if let Some(folder) = &self.notes {
             if solution.notes.is_empty() {
                 eprintln!("warning: the method {} makes nothing on its way", self.method);
             }
             for note in &solution.notes {
-                io::write_color(&folder.join(format!("{}.exr", note.name)), &note.image, None, &frame.attributes)?;
+                io::write_color(&folder.join(format!("{}.exr", note.name)), &note.image, &[], &frame.attributes)?;
             }
         }
-        Ok(solution)
+        Ok(())
     }
 }
 
-/// Writes the image to every output, with the estimated error where the format has layers, and takes the time.
+/// Writes the image to every output, with estimated error and sample counts where the format has layers, and takes the
+/// time.
 pub fn write(outputs: &[PathBuf], solution: &Solution, frame: &Frame, stats: &mut Stats) -> Result<(), Error> {
     let start = Instant::now();
+    let error = solution.error.as_ref().map(|error| ("error", error));
+    let samples = frame.get(Layer::Samples).map(|samples| ("samples", samples));
+    let layers: Vec<_> = error.into_iter().chain(samples).collect();
     for path in outputs {
-        io::write_color(path, &solution.image, solution.error.as_ref(), &frame.attributes)?;
+        io::write_color(path, &solution.image, &layers, &frame.attributes)?;
     }
     stats.seconds.write += start.elapsed().as_secs_f64();
     Ok(())

@@ -69,6 +69,12 @@ fn parse_size(text: &str) -> Result<(usize, usize), String> {
     ))
 }
 
+/// A positive number.
+fn parse_positive(text: &str) -> Result<f64, String> {
+    let number = text.parse().ok().filter(|&number: &f64| number > 0.0 && number.is_finite());
+    number.ok_or_else(|| "this must be a positive number".into())
+}
+
 /// Seconds, or a number with the unit s, m or h.
 fn parse_time(text: &str) -> Result<Duration, String> {
     let units = [("s", 1.0), ("m", 60.0), ("h", 3600.0)];

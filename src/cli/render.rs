@@ -6,9 +6,11 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Result, bail};
 use clap::builder::{PossibleValue, PossibleValuesParser};
+use fluxion::adaptive::{self, ALLOCATORS, Allocator, Limits};
 use fluxion::error::Error;
-use fluxion::film::{Needs, exr};
+use fluxion::film::{Frame, Needs, exr};
 use fluxion::plan::Plan;
+use fluxion::reconstruct::{Reconstruction, Solution};
 use fluxion::render::gradient::Tracer;
 use fluxion::render::gradient::shift::{SHIFTS, Shift};
 use fluxion::render::{self, Budget, Control, Outcome, SampleId, Settings};
@@ -32,6 +34,12 @@ pub struct Args {
     /// Time to render for, as in 60, 60s or 5m
     #[arg(long, value_parser = super::parse_time, value_name = "TIME")]
     time: Option<Duration>,
+    /// Deal samples to the pixels that need them, by an allocator
+    #[arg(long, value_name = "ALLOCATOR", num_args = 0..=1, default_missing_value = ALLOCATORS[0].id(), value_parser = allocator_names())]
+    adaptive: Option<String>,
+    /// Stop when the estimated relMSE is below this; --spp or --time is a limit then
+    #[arg(long, value_name = "RELMSE", value_parser = super::parse_positive)]
+    target_error: Option<f64>,
     /// Seed of the random numbers; the same seed gives the same bits on any number of threads
     #[arg(long, default_value_t = 0)]
     seed: u64,
@@ -107,30 +115,86 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     if let Some(sample) = args.replay {
         return replay(args, &scene, sample);
     }
-    let outcome = trace(args, &scene, plan.needs)?;
-    warn(args, &outcome);
-    stats.seconds.render = outcome.elapsed.as_secs_f64();
-    (stats.spp, stats.samples, stats.rejected) = (outcome.spp, outcome.film.samples(), outcome.film.rejected());
-
-    let start = Instant::now();
-    let mut frame = outcome.film.develop();
-    if method.needs().edges && !plan.needs.edges {
-        frame.fill_dark_edges();
-    }
-    frame.attributes = attributes(args, &scene, &stats);
-    stats.seconds.develop = start.elapsed().as_secs_f64();
-    if let Some(path) = &args.layers {
+    let (frame, solution) = if args.adaptive.is_some() || args.target_error.is_some() {
+        adaptive(args, &scene, method.as_ref(), &plan, &mut stats)?
+    } else {
+        let outcome = trace(args, &scene, plan.needs)?;
+        warn(args, &outcome);
+        stats.rendered(&outcome);
         let start = Instant::now();
-        exr::save(path, &frame)?;
-        stats.seconds.write += start.elapsed().as_secs_f64();
-    }
-    let solution = args.method.solve(method.as_ref(), &frame, args.quiet, &mut stats)?;
+        let mut frame = outcome.film.develop();
+        if method.needs().edges && !plan.needs.edges {
+            frame.fill_dark_edges();
+        }
+        frame.attributes = attributes(args, &scene, &stats);
+        stats.seconds.develop = start.elapsed().as_secs_f64();
+        save(args, &frame, &mut stats)?;
+        let solution = args.method.solve(method.as_ref(), &frame, args.quiet, &mut stats)?;
+        (frame, solution)
+    };
     method::write(&args.output, &solution, &frame, &mut stats)?;
     if let Some(path) = &args.json {
         stats.save(path)?;
     }
     report(args, &stats);
     Ok(ExitCode::SUCCESS)
+}
+
+/// Saves the layers, if they are asked for.
+fn save(args: &Args, frame: &Frame, stats: &mut Stats) -> Result<()> {
+    if let Some(path) = &args.layers {
+        let start = Instant::now();
+        exr::save(path, frame)?;
+        stats.seconds.write += start.elapsed().as_secs_f64();
+    }
+    Ok(())
+}
+
+fn allocator_names() -> PossibleValuesParser {
+    let name = |allocator: &&dyn Allocator| PossibleValue::new(allocator.id()).help(allocator.summary());
+    ALLOCATORS.iter().map(name).collect::<Vec<_>>().into()
+}
+
+/// Renders and reconstructs in passes.
+fn adaptive(
+    args: &Args,
+    scene: &Scene,
+    method: &dyn Reconstruction,
+    plan: &Plan,
+    stats: &mut Stats,
+) -> Result<(Frame, Solution)> {
+    let limits = Limits {
+        // Without any limit the scene says how much.
+        spp: args.spp.or((args.time.is_none() && args.target_error.is_none()).then_some(scene.sensor().spp)),
+        time: args.time,
+        error: args.target_error,
+    };
+    let settings = adaptive::Settings {
+        render: settings(args, plan.needs, Budget::Spp(1)),
+        method,
+        allocator: adaptive::allocator(args.adaptive.as_deref().unwrap_or("uniform"))?,
+        limits,
+        reconstruction: None,
+        lit: plan.needs.edges || !method.needs().edges,
+    };
+    let stop = super::stop_on_interrupt()?;
+    let bar = progress::bar(args.quiet);
+    bar.set_message("rendering");
+    let report = |share| progress::set(&bar, share);
+    let context = args.method.context(&|_, _| ());
+    let outcome = adaptive::run(scene, &settings, &Control { stop: &stop, progress: &report }, &context)?;
+    bar.finish_and_clear();
+    let adaptive::Outcome { render, mut frame, solution, passes, develop, reconstruct } = outcome;
+    warn(args, &render);
+    stats.rendered(&render);
+    (stats.seconds.develop, stats.seconds.reconstruct, stats.passes) = (develop, reconstruct, passes);
+    frame.attributes = attributes(args, scene, stats);
+    save(args, &frame, stats)?;
+    args.method.write_notes(&solution, &frame)?;
+    if let (false, Some(error)) = (args.quiet, stats.passes.last().and_then(|pass| pass.error)) {
+        eprintln!("estimated relMSE {error:.2e} after {} passes", stats.passes.len());
+    }
+    Ok((frame, solution))
 }
 
 fn shift_names() -> PossibleValuesParser {
@@ -145,13 +209,17 @@ fn shift(args: &Args) -> Shift {
     }
 }
 
+fn settings(args: &Args, needs: Needs, budget: Budget) -> Settings {
+    Settings { budget, seed: args.seed, first: 0, needs, shift: shift(args) }
+}
+
 fn trace(args: &Args, scene: &Scene, needs: Needs) -> Result<Outcome> {
     let stop = super::stop_on_interrupt()?;
     let budget = match args.time {
         Some(time) => Budget::Time(time),
         None => Budget::Spp(args.spp.unwrap_or(scene.sensor().spp)),
     };
-    let settings = Settings { budget, seed: args.seed, first: 0, needs, shift: shift(args) };
+    let settings = settings(args, needs, budget);
     let bar = progress::bar(args.quiet);
     bar.set_message("rendering");
     let report = |share| progress::set(&bar, share);

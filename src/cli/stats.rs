@@ -3,6 +3,8 @@
 use std::path::Path;
 
 use anyhow::{Context, Result};
+use fluxion::adaptive::Pass;
+use fluxion::render::Outcome;
 use serde::Serialize;
 
 /// Wall-clock seconds of the stages.
@@ -25,7 +27,7 @@ pub struct Seconds {
 pub struct Stats {
     /// Time per stage.
     pub seconds: Seconds,
-    /// Samples per pixel.
+    /// Samples per pixel, the mean.
     pub spp: u32,
     /// Samples of all pixels.
     pub samples: u64,
@@ -37,9 +39,20 @@ pub struct Stats {
     pub method: String,
     /// What was computed and what was left out.
     pub plan: String,
+    /// Passes of adaptive sampling.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub passes: Vec<Pass>,
 }
 
 impl Stats {
+    /// Takes over what a render took.
+    pub fn rendered(&mut self, outcome: &Outcome) {
+        self.seconds.render = outcome.elapsed.as_secs_f64();
+        let film = &outcome.film;
+        (self.samples, self.rejected) = (film.samples(), film.rejected());
+        self.spp = (self.samples as f64 / (film.width * film.height) as f64).round() as u32;
+    }
+
     /// Writes the object, with the peak memory as it is now.
     pub fn save(&mut self, path: &Path) -> Result<()> {
         self.peak_bytes = fluxion::bench::peak_bytes();

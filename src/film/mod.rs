@@ -188,6 +188,22 @@ impl Film {
         self.tiles.iter().flat_map(|tile| &tile.counts).map(|&count| u64::from(count)).sum()
     }
 
+    /// Samples of every pixel, row by row.
+    pub fn counts(&self) -> Vec<u32> {
+        let mut counts = vec![0; self.width * self.height];
+        for tile in &self.tiles {
+            for (row, from) in tile.counts.chunks_exact(tile.width).enumerate() {
+                counts[(tile.y + row) * self.width + tile.x..][..tile.width].copy_from_slice(from);
+            }
+        }
+        counts
+    }
+
+    /// Samples of the pixel that has the most.
+    pub fn most_samples(&self) -> u32 {
+        self.tiles.iter().flat_map(|tile| &tile.counts).copied().max().unwrap_or(0)
+    }
+
     /// Samples that were not finite.
     pub fn rejected(&self) -> u64 {
         self.tiles.iter().flat_map(|tile| &tile.rejected).map(|&count| u64::from(count)).sum()

@@ -27,26 +27,32 @@ pub fn check_writable(path: &Path) -> Result<()> {
 }
 
 /// Writes a linear RGB image: as it is to exr and hdr; clamped and sRGB-encoded to png and jpg. An exr file gets
-/// the squared `error` of each value as layer `error`.
-pub fn write_color(path: &Path, image: &Image, error: Option<&Image>, attributes: &[(String, String)]) -> Result<()> {
+/// the named `layers`, too, of three channels or one.
+pub fn write_color(
+    path: &Path,
+    image: &Image,
+    layers: &[(&str, &Image)],
+    attributes: &[(String, String)],
+) -> Result<()> {
     check_writable(path)?;
     let encoded = ENCODED.contains(&extension(path).as_str());
     let encode = |&value: &f32| srgb_encode(value.clamp(0.0, 1.0));
-    let data = if encoded { image.data.iter().map(encode).collect() } else { image.data.clone() };
     let exr = extension(path) == "exr";
-    let mut pixels = Pixels {
-        width: image.width,
-        height: image.height,
-        channels: ["R", "G", "B"].map(String::from).to_vec(),
-        data,
-        eight_bit: encoded,
-        attributes: attributes.to_vec(),
-    };
-    if let (true, Some(error)) = (exr, error) {
-        pixels.channels.extend(["error.R", "error.G", "error.B"].map(String::from));
-        let both = pixels.data.chunks_exact(3).zip(error.data.chunks_exact(3));
-        pixels.data = both.flat_map(|(value, error)| value.iter().chain(error)).copied().collect();
+    let layers = if exr { layers } else { &[] };
+    let mut channels = ["R", "G", "B"].map(String::from).to_vec();
+    for (name, layer) in layers {
+        let components = if layer.channels == 1 { &["Y"][..] } else { &["R", "G", "B"] };
+        channels.extend(components.iter().map(|component| format!("{name}.{component}")));
     }
+    let data = if encoded {
+        image.data.iter().map(encode).collect()
+    } else {
+        let all = || std::iter::once(image).chain(layers.iter().map(|(_, layer)| *layer));
+        let pixels = 0..image.width * image.height;
+        pixels.flat_map(|i| all().flat_map(move |image| &image.data[i * image.channels..][..image.channels])).copied().collect()
+    };
+    let (width, height, attributes) = (image.width, image.height, attributes.to_vec());
+    let pixels = Pixels { width, height, channels, data, eight_bit: encoded, attributes };
     write(path, &pixels, if encoded { Kind::Uint8 } else { Kind::Float }, exr.then_some("zips"))
 }
 
@@ -82,13 +88,13 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         for (name, tolerance) in [("a.exr", 0.0), ("a.hdr", 0.01), ("a.png", 0.01), ("a.jpg", 0.2)] {
             let path = folder.path().join(name);
-            write_color(&path, &image, None, &[]).unwrap();
+            write_color(&path, &image, &[], &[]).unwrap();
             let back = read_color(&path).unwrap();
             assert_eq!(back.shape(), image.shape());
             let worst = back.data.iter().zip(&image.data).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
             assert!(worst <= tolerance, "{name}: {worst}");
         }
-        let error = write_color(&folder.path().join("a.xyz"), &image, None, &[]).unwrap_err();
+        let error = write_color(&folder.path().join("a.xyz"), &image, &[], &[]).unwrap_err();
         assert!(error.to_string().contains("not one of exr"), "{error}");
     }
 }

@@ -32,6 +32,10 @@ impl Reconstruction for Feature {
         Needs { features: self.options.needs_features(), edges: true, bins: true }
     }
 
+    fn estimates_error(&self) -> bool {
+        true
+    }
+
     fn reconstruct(&self, frame: &Frame, context: &Context) -> Result<Solution> {
         let inputs = Inputs::new(frame, 1)?;
         check_memory(frame, context, METHOD.id, BYTES)?;

@@ -58,6 +58,11 @@ pub trait Reconstruction: Send + Sync {
     /// What must be rendered for it.
     fn needs(&self) -> Needs;
 
+    /// Whether solutions have an error.
+    fn estimates_error(&self) -> bool {
+        false
+    }
+
     /// The image without directly seen emitters, which [`solve`] adds.
     fn reconstruct(&self, frame: &Frame, context: &Context) -> Result<Solution>;
 }

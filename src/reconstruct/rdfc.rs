@@ -38,6 +38,10 @@ impl Reconstruction for Rdfc {
         Needs { features: true, ..Needs::default() }
     }
 
+    fn estimates_error(&self) -> bool {
+        true
+    }
+
     fn reconstruct(&self, frame: &Frame, context: &Context) -> Result<Solution> {
         let inputs = Inputs::new(frame, 1)?;
         check_memory(frame, context, METHOD.id, BYTES)?;

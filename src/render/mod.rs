@@ -6,7 +6,7 @@ mod sampler;
 mod schedule;
 
 pub use self::sampler::Sampler;
-pub use self::schedule::{Budget, Control, Outcome, Settings, render};
+pub use self::schedule::{Budget, Control, Outcome, Settings, add, render};
 use crate::film::Sample;
 use crate::math::{Vec2, vec2};
 use crate::scene::{Ray, Scene};

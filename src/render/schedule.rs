@@ -59,27 +59,28 @@ pub struct Outcome {
     pub first_rejected: Option<(SampleId, Rejected)>,
 }
 
+impl Outcome {
+    /// Nothing rendered yet.
+    pub fn new(scene: &Scene, needs: Needs) -> Self {
+        let film = Film::new(scene.sensor().width, scene.sensor().height, needs);
+        Self { film, spp: 0, elapsed: Duration::ZERO, stopped: false, first_rejected: None }
+    }
+}
+
 /// Samples that a wave adds to every pixel: few enough for progress and for stopping in time.
 const WAVE: u32 = 8;
 
 /// Renders until the budget is used up.
 pub fn render(scene: &Scene, settings: Settings, control: &Control) -> Outcome {
     let start = Instant::now();
-    let sensor = scene.sensor();
-    let mut outcome = Outcome {
-        film: Film::new(sensor.width, sensor.height, settings.needs),
-        spp: 0,
-        elapsed: Duration::ZERO,
-        stopped: false,
-        first_rejected: None,
-    };
+    let mut outcome = Outcome::new(scene, settings.needs);
     while let Some(wave) = next_wave(settings.budget, outcome.spp, start.elapsed()) {
         let done = outcome.spp;
         let progress = |share: f32| match settings.budget {
             Budget::Spp(spp) => (control.progress)((done as f32 + wave as f32 * share) / spp as f32),
             Budget::Time(limit) => (control.progress)(start.elapsed().as_secs_f32() / limit.as_secs_f32()),
         };
-        run_wave(scene, settings, &Control { stop: control.stop, progress: &progress }, &mut outcome, wave);
+        run_wave(scene, settings, &Control { stop: control.stop, progress: &progress }, &mut outcome, &|_, _| wave);
         outcome.spp += wave;
         outcome.stopped = control.stop.load(Ordering::Relaxed);
         if outcome.stopped {
@@ -88,6 +89,16 @@ pub fn render(scene: &Scene, settings: Settings, control: &Control) -> Outcome {
     }
     outcome.elapsed = start.elapsed();
     outcome
+}
+
+/// Renders on: adds as many samples to each pixel as `counts` says, row by row. The budget is not looked at.
+pub fn add(scene: &Scene, settings: Settings, control: &Control, outcome: &mut Outcome, counts: &[u32]) {
+    let start = Instant::now();
+    let width = outcome.film.width;
+    run_wave(scene, settings, control, outcome, &|x, y| counts[y * width + x]);
+    outcome.spp = outcome.film.most_samples();
+    outcome.stopped = control.stop.load(Ordering::Relaxed);
+    outcome.elapsed += start.elapsed();
 }
 
 /// Samples per pixel of the next wave, none when the budget is used up. A time budget is met by the waves' own
@@ -105,8 +116,11 @@ fn next_wave(budget: Budget, done: u32, elapsed: Duration) -> Option<u32> {
     }
 }
 
-/// Adds `wave` samples to every pixel; `control.progress` is told the share of the wave.
-fn run_wave(scene: &Scene, settings: Settings, control: &Control, outcome: &mut Outcome, wave: u32) {
+/// Number of samples that a wave adds to the pixel in a column and row.
+type Wave<'a> = &'a (dyn Fn(usize, usize) -> u32 + Sync);
+
+/// Adds a wave; `control.progress` is told the share of it.
+fn run_wave(scene: &Scene, settings: Settings, control: &Control, outcome: &mut Outcome, wave: Wave) {
     let first_rejected = Mutex::new(outcome.first_rejected);
     let tiles = outcome.film.tiles_mut();
     let (total, done) = (tiles.len(), Mutex::new(0));
@@ -125,12 +139,14 @@ fn run_wave(scene: &Scene, settings: Settings, control: &Control, outcome: &mut 
     outcome.first_rejected = first_rejected.into_inner().unwrap_or_else(|poisoned| poisoned.into_inner());
 }
 
-fn run_tile(scene: &Scene, settings: Settings, tile: &mut Tile, wave: u32) -> Option<(SampleId, Rejected)> {
+fn run_tile(scene: &Scene, settings: Settings, tile: &mut Tile, wave: Wave) -> Option<(SampleId, Rejected)> {
     let mut tracer = settings.needs.edges.then(|| Tracer::new(settings.shift));
     let mut first_rejected = None;
-    for _ in 0..wave {
-        for pixel in 0..tile.width * tile.height {
-            let (x, y) = (tile.x + pixel % tile.width, tile.y + pixel / tile.width);
+    let at = |pixel: usize, tile: &Tile| (tile.x + pixel % tile.width, tile.y + pixel / tile.width);
+    let counts: Vec<u32> = (0..tile.width * tile.height).map(|pixel| at(pixel, tile)).map(|(x, y)| wave(x, y)).collect();
+    for turn in 0..counts.iter().copied().max().unwrap_or(0) {
+        for pixel in (0..counts.len()).filter(|&pixel| turn < counts[pixel]) {
+            let (x, y) = at(pixel, tile);
             let id = SampleId { seed: settings.seed, x, y, index: settings.first + tile.count(pixel) };
             if let Err(reason) = tile.add(pixel, &sample(scene, id, tracer.as_mut())) {
                 first_rejected.get_or_insert((id, reason));

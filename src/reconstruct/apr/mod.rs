@@ -120,6 +120,10 @@ impl Reconstruction for Apr {
         Needs { features, edges: self.generated.is_some(), bins: self.generated.is_some() }
     }
 
+    fn estimates_error(&self) -> bool {
+        true
+    }
+
     fn reconstruct(&self, frame: &Frame, context: &Context) -> Result<Solution> {
         let inputs = Inputs::new(frame, 1)?;
         check_memory(frame, context, METHOD.id, BYTES)?;

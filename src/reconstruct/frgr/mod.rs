@@ -109,6 +109,10 @@ impl Reconstruction for Frgr {
         Needs { features: !self.features.is_empty(), edges: true, ..Needs::default() }
     }
 
+    fn estimates_error(&self) -> bool {
+        true
+    }
+
     fn reconstruct(&self, frame: &Frame, context: &Context) -> Result<Solution> {
         (context.progress)("clean", 0.0);
         let inputs = Inputs::new(frame, 1 << (self.levels - 1))?;

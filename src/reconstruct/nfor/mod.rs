@@ -43,6 +43,10 @@ impl Reconstruction for Nfor {
         Needs { features: true, bins: true, ..Needs::default() }
     }
 
+    fn estimates_error(&self) -> bool {
+        true
+    }
+
     fn reconstruct(&self, frame: &Frame, context: &Context) -> Result<Solution> {
         let inputs = Inputs::new(frame, 1)?;
         check_memory(frame, context, METHOD.id, BYTES)?;

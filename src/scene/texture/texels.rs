@@ -135,7 +135,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         for name in ["a.png", "a.exr"] {
             let path = folder.path().join(name);
-            io::write_color(&path, &image, None, &[]).unwrap();
+            io::write_color(&path, &image, &[], &[]).unwrap();
             let held = Texels::read(&path, &mut Memory::new(1 << 20)).unwrap();
             let cached = Texels::read(&path, &mut Memory::new(100)).unwrap();
             assert!(
