@@ -44,6 +44,9 @@ impl Plan {
             item("gradients", needs.edges, gradients),
             item("features", needs.features, reason(method.features, saved.features)),
             item("bins", needs.bins, reason(method.bins, saved.bins)),
+            item("occlusion", needs.occlusion, reason(method.occlusion, saved.occlusion)),
+            item("position", needs.position, reason(method.position, saved.position)),
+            item("ambient", needs.ambient, reason(method.ambient, saved.ambient)),
         ];
         Self { needs, items }
     }

@@ -5,7 +5,7 @@ use crate::film::{Frame, Layer};
 use crate::image::planes::Planes;
 use crate::reconstruct::Solution;
 
-/// Luminance below which relMSE counts errors as they are.
+/// Luminance squared below which relMSE counts errors as they are.
 const EPSILON: f64 = 0.01;
 
 /// How certain it is beforehand that estimates are right: as if so much had been seen.
@@ -14,18 +14,36 @@ const PRIOR: f64 = 10.0;
 /// Squares of noise are not normally distributed: they tell less than they would.
 const TAILS: f64 = 0.1;
 
-/// Ratios of true to estimated errors, from all passes so far.
-#[derive(Clone, Copy, Debug)]
+/// What has been seen in all passes so far. Sums over pixels, errors relative to the image's brightness.
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Estimate {
-    /// Of the method's estimate: weighted sums of what was found times what was expected, and of the latter's squares.
-    scattered: (f64, f64),
-    /// Of directly seen emitters, whose samples are spread better than independent ones: sums of found and expected.
-    direct: (f64, f64),
+    /// Weighted squares of expected errors.
+    expected: f64,
+    /// Weighted products of expected errors and squared distances of the image from new samples, and with the variances
+    /// that these claim to have.
+    found: f64,
+    claimed: f64,
+    /// Squared distances of new samples from old ones, and the variances that both claim: samples that are spread well
+    /// vary less than independent ones. Of scattered light and of directly seen emitters.
+    spread: [Ratio; 2],
 }
 
-impl Default for Estimate {
-    fn default() -> Self {
-        Self { scattered: (PRIOR, PRIOR), direct: (1e-9, 1e-9) }
+/// Found over expected.
+#[derive(Clone, Copy, Debug, Default)]
+struct Ratio {
+    found: f64,
+    expected: f64,
+}
+
+impl Ratio {
+    fn add(&mut self, found: f64, expected: f64) {
+        self.found += found;
+        self.expected += expected;
+    }
+
+    /// At most one: spreading does no harm.
+    fn value(self) -> f64 {
+        if self.expected > 0.0 { (self.found / self.expected).clamp(0.01, 1.0) } else { 1.0 }
     }
 }
 
@@ -58,44 +76,57 @@ const DIRECT: [Layer; 2] = [Layer::Direct, Layer::DirectVariance];
 impl Estimate {
     /// Compares an image with the samples that were added since.
     pub fn learn(&mut self, before: &Frame, solution: &Solution, after: &Frame) {
-        let (Some(error), Some(n), Some(all)) =
-            (&solution.error, before.get(Layer::Samples), after.get(Layer::Samples))
-        else {
+        let (Some(error), Some(n), Some(all), Some(noise)) = (
+            &solution.error,
+            before.get(Layer::Samples),
+            after.get(Layer::Samples),
+            smooth_variance(before),
+        ) else {
             return;
         };
-        let Some(noise) = smooth_variance(before) else { return };
-        for at in 0..solution.image.data.len() {
-            let pixel = at / 3;
-            let (n, all) = (f64::from(n.data[pixel]), f64::from(all.data[pixel]));
-            let of = |frame, layers| Moments::of(frame, layers, at);
-            let both = (of(before, COLOR), of(after, COLOR), of(before, DIRECT), of(after, DIRECT));
-            let (Some(color), Some(color_after), Some(direct), Some(direct_after)) = both else { return };
+        let expected = |at: usize, color: &Moments, direct: &Moments| {
+            let relative = 1.0 / (color.mean.powi(2) + EPSILON);
+            (relative, relative * scattered(f64::from(error.data[at]), direct.variance))
+        };
+        let of = |at, frame| Some([Moments::of(frame, COLOR, at)?, Moments::of(frame, DIRECT, at)?]);
+        let values = solution.image.data.len();
+        let known = |at| of(at, before).map_or(0.0, |[color, direct]| expected(at, &color, &direct).1);
+        // Where noise is small beside the typical error, all pixels count alike.
+        let typical = (0..values).map(known).sum::<f64>() / values as f64;
+        for at in 0..values {
+            let (n, all) = (f64::from(n.data[at / 3]), f64::from(all.data[at / 3]));
+            let (Some([color, direct]), Some([color_after, direct_after])) = (of(at, before), of(at, after)) else { return };
             if all - n < 2.0 || n < 2.0 {
                 continue;
             }
-            let weight = 1.0 / (color.mean.powi(2) + EPSILON);
-            let new = direct_after.since(&direct, n, all);
-            self.direct.0 += weight * (new.mean - direct.mean).powi(2);
-            self.direct.1 += weight * (new.variance + direct.variance);
-
+            let (relative, expected) = expected(at, &color, &direct);
+            // Pixels count by how well they tell: one over the variance of what is found.
+            let spread = relative * f64::from(noise[at]) * n / (all - n) + expected + typical;
+            let weight = TAILS / (2.0 * spread * spread).max(1e-30);
             let new = color_after.since(&color, n, all);
-            let expected = scattered(f64::from(error.data[at]), direct.variance);
-            let found = (f64::from(solution.image.data[at]) - direct.mean - new.mean).powi(2) - new.variance;
-            // Pixels count by how well they tell: one over the variance of `found`.
-            let spread = f64::from(noise[at]) * n / (all - n) + expected;
-            if spread > 0.0 {
-                let weight = TAILS / (2.0 * spread * spread);
-                self.scattered.0 += weight * expected * found;
-                self.scattered.1 += weight * expected * expected;
-            }
+            let distance = f64::from(solution.image.data[at]) - direct.mean - new.mean;
+            self.expected += weight * expected * expected;
+            self.found += weight * expected * relative * distance.powi(2);
+            self.claimed += weight * expected * relative * new.variance;
+            let apart = |new: &Moments, old: &Moments| ((new.mean - old.mean).powi(2), new.variance + old.variance);
+            let (found, claimed) = apart(&new, &color);
+            self.spread[0].add(weight * expected * relative * found, weight * expected * relative * claimed);
+            let (found, claimed) = apart(&direct_after.since(&direct, n, all), &direct);
+            self.spread[1].add(relative * found, relative * claimed);
         }
+    }
+
+    /// What scattered light's estimated errors are to be multiplied by.
+    fn ratio(&self) -> f64 {
+        let found = self.found - self.spread[0].value() * self.claimed;
+        ((PRIOR + found) / (PRIOR + self.expected)).clamp(0.1, 10.0)
     }
 
     /// The estimated relMSE of an image.
     pub fn rel_mse(&self, frame: &Frame, solution: &Solution) -> f64 {
         let Some(error) = &solution.error else { return f64::INFINITY };
-        let ratio = |(found, expected): (f64, f64)| (found / expected).clamp(0.05, 20.0);
-        let (of_scattered, of_direct) = (ratio(self.scattered), ratio(self.direct));
+        let (of_scattered, of_direct) = (self.ratio(), self.spread[1].value());
+        if std::env::var("DBG").is_ok() { eprintln!("ratio {of_scattered} prior {PRIOR} expected {} direct {of_direct} spread {}", self.expected, self.spread[0].value()); }
         let variance = frame.get(Layer::DirectVariance);
         let relative = |at: usize| {
             let direct = variance.map_or(0.0, |variance| f64::from(variance.data[at]));

@@ -126,6 +126,9 @@ const OVERHEAD: f64 = 0.1;
 /// The least and the most that a pass adds to the samples on the way to an error.
 const GROWTH: (f64, f64) = (0.15, 1.0);
 
+/// The least that the first of these passes adds.
+const CONFIRM: f64 = 0.5;
+
 /// How errors fall with samples, when guessing how many will do.
 const SLOPE: f64 = 0.85;
 
@@ -236,11 +239,11 @@ impl Run<'_> {
         // One sample tells the speed.
         self.add(1);
         let all = self.affordable() / self.pixels() + 1.0;
-        let first = f64::from(if error.is_some() { 2 * FIRST } else { FIRST }).max(FIRST_SHARE * all.min(1e9));
+        let share = if error.is_some() { 0.0 } else { FIRST_SHARE * all };
+        let first = f64::from(FIRST).max(share);
         let too_slow = |time: Duration| self.goes_by_error && self.finish() > 2.0 * OVERHEAD * time.as_secs_f64();
         let decides = error.is_some() || self.settings.allocator.id() != uniform::Uniform.id();
         if decides && all > 1.5 * first && !time.is_some_and(too_slow) {
-            let first = if error.is_some() { f64::from(2 * FIRST) } else { first };
             return self.add(first as u32 - 1);
         }
         self.left = 0;
@@ -255,9 +258,11 @@ impl Run<'_> {
             return None;
         }
         if let Some(target) = self.settings.limits.error {
-            let error = error.filter(|error| *error > target)?;
-            let growth = (error / target).powf(1.0 / SLOPE) - 1.0;
-            return Some((self.samples() * growth.clamp(GROWTH.0, GROWTH.1)).min(most));
+            let growth = (error? / target).powf(1.0 / SLOPE) - 1.0;
+            // New samples are to confirm what the first image claims.
+            let least = if self.passes.len() == 1 { CONFIRM } else { GROWTH.0 };
+            let reached = self.passes.len() > 1 && growth <= 0.0;
+            return (!reached).then(|| (self.samples() * growth.clamp(least, GROWTH.1)).min(most));
         }
         let cost = if self.goes_by_error { self.finish() } else { 0.0 };
         let time = self.settings.limits.time.map(|time| time.as_secs_f64());

@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 
 use super::case::Case;
 use super::record::{Record, Seconds, machine};
+use crate::adaptive::{self, Allocator, Limits};
 use crate::error::Result;
 use crate::film::{Frame, Needs};
 use crate::image::Image;
@@ -62,6 +63,7 @@ pub struct Runner<'a> {
     /// The method as it was asked for.
     pub method: &'a str,
     made: Box<dyn Reconstruction>,
+    allocator: Option<&'static dyn Allocator>,
     needs: Needs,
     lit: bool,
 }
@@ -77,10 +79,20 @@ pub struct Ran {
 impl<'a> Runner<'a> {
     /// Builds the method and decides what to render for it.
     pub fn new(case: &'a Case, method: &'a str) -> Result<Self> {
-        let made = reconstruct::parse(method)?;
+        let (id, allocator) = adaptive::parse(method)?;
+        let made = reconstruct::parse(id)?;
         let needs = Plan::new(&case.scene, made.needs(), Needs::default()).needs;
         let lit = needs.edges || !made.needs().edges;
-        Ok(Self { case, method, made, needs, lit })
+        Ok(Self { case, method, made, allocator, needs, lit })
+    }
+
+    /// Whether samples go where they are needed.
+    pub fn is_adaptive(&self) -> bool {
+        self.allocator.is_some()
+    }
+
+    fn settings(&self, budget: render::Budget, seed: u64) -> Settings {
+        Settings { budget, seed, first: 0, needs: self.needs, shift: Shift::default() }
     }
 
     fn frame(
@@ -90,8 +102,8 @@ impl<'a> Runner<'a> {
         stop: &AtomicBool,
         seconds: &mut Seconds,
     ) -> (render::Outcome, Frame) {
-        let settings = Settings { budget, seed, first: 0, needs: self.needs, shift: Shift::default() };
-        let outcome = render(&self.case.scene, settings, &Control { stop, progress: &|_| {} });
+        let control = Control { stop, progress: &|_| {} };
+        let outcome = render(&self.case.scene, self.settings(budget, seed), &control);
         seconds.render = outcome.elapsed.as_secs_f64();
         let start = Instant::now();
         let mut frame = outcome.film.develop();
@@ -123,22 +135,70 @@ impl<'a> Runner<'a> {
         Ok(Pilot { sample: seconds.render / 2.0, finish })
     }
 
+    /// As many samples for every pixel. None if it was stopped.
+    fn straight(
+        &self,
+        budget: Budget,
+        seed: u64,
+        pilot: Pilot,
+        stop: &AtomicBool,
+        seconds: &mut Seconds,
+    ) -> Result<Option<(render::Outcome, Image)>> {
+        let allowed = match budget {
+            Budget::Spp(spp) => render::Budget::Spp(spp),
+            Budget::Seconds(total) => render::Budget::Time(Duration::from_secs_f64((total - pilot.finish).max(1e-6))),
+        };
+        let (outcome, frame) = self.frame(allowed, seed, stop, seconds);
+        if outcome.stopped {
+            return Ok(None);
+        }
+        let image = self.finish(&frame, seconds)?;
+        Ok(Some((outcome, image)))
+    }
+
+    /// Samples where they are needed. None if it was stopped.
+    fn adapt(
+        &self,
+        allocator: &dyn Allocator,
+        budget: Budget,
+        seed: u64,
+        pilot: Pilot,
+        stop: &AtomicBool,
+        seconds: &mut Seconds,
+    ) -> Result<Option<(render::Outcome, Image)>> {
+        let limits = match budget {
+            Budget::Spp(spp) => Limits { spp: Some(spp), ..Limits::default() },
+            Budget::Seconds(total) => Limits { time: Some(Duration::from_secs_f64(total)), ..Limits::default() },
+        };
+        let settings = adaptive::Settings {
+            render: self.settings(render::Budget::Spp(1), seed),
+            method: self.made.as_ref(),
+            allocator,
+            limits,
+            reconstruction: Some(Duration::from_secs_f64(pilot.finish)),
+            lit: self.lit,
+        };
+        let context = Context { progress: &|_, _| {}, memory: None, notes: false };
+        let control = Control { stop, progress: &|_| {} };
+        let outcome = adaptive::run(&self.case.scene, &settings, &control, &context)?;
+        let adaptive::Outcome { render, solution, develop, reconstruct, .. } = outcome;
+        (seconds.render, seconds.develop, seconds.reconstruct) = (render.elapsed.as_secs_f64(), develop, reconstruct);
+        Ok((!render.stopped).then_some((render, solution.image)))
+    }
+
     /// Runs with a seed, within a budget; `pilot` says how long the reconstruction is going to take. None if `stop` was
     /// set before the samples were taken.
     pub fn run(&self, budget: Budget, seed: u64, pilot: Pilot, stop: &AtomicBool) -> Result<Option<Ran>> {
         reset_peak();
         let mut seconds = Seconds { load: self.case.load, ..Seconds::default() };
-        let allowed = match budget {
-            Budget::Spp(spp) => render::Budget::Spp(spp),
-            Budget::Seconds(total) => render::Budget::Time(Duration::from_secs_f64((total - pilot.finish).max(1e-6))),
-        };
         // Runs of different budgets do not share samples; those of different methods do.
         let salt = budget.to_string().bytes().fold(0, |hash, byte| rng::combine(hash, u64::from(byte)));
-        let (outcome, frame) = self.frame(allowed, rng::combine(seed, salt), stop, &mut seconds);
-        if outcome.stopped {
-            return Ok(None);
-        }
-        let image = self.finish(&frame, &mut seconds)?;
+        let seed_of_run = rng::combine(seed, salt);
+        let made = match self.allocator {
+            Some(allocator) => self.adapt(allocator, budget, seed_of_run, pilot, stop, &mut seconds)?,
+            None => self.straight(budget, seed_of_run, pilot, stop, &mut seconds)?,
+        };
+        let Some((outcome, image)) = made else { return Ok(None) };
         seconds.total = seconds.render + seconds.develop + seconds.reconstruct;
         let peak_bytes = peak_bytes();
         let mut metrics = BTreeMap::new();
@@ -157,7 +217,7 @@ impl<'a> Runner<'a> {
             width: image.width,
             height: image.height,
             fingerprint: fingerprint(&self.case.scene),
-            spp: outcome.spp,
+            spp: (outcome.film.samples() as f64 / (image.width * image.height) as f64).round() as u32,
             seconds,
             metrics,
             negative,

@@ -6,6 +6,7 @@ use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use anyhow::{Result, bail};
+use fluxion::adaptive;
 use fluxion::bench::{Budget, Case, Results, Runner, Runs, Store, Truth};
 use fluxion::error::Error;
 use fluxion::reconstruct::{self, METHODS};
@@ -19,7 +20,8 @@ pub struct Args {
     /// Scene files, or folders that hold a scene.xml or folders that do
     #[arg(required = true)]
     scenes: Vec<PathBuf>,
-    /// Methods with their parameters, separated by commas [default: all]
+    /// Methods with their parameters, separated by commas, each also as METHOD+adaptive or METHOD+adaptive=ALLOCATOR
+    /// [default: all]
     #[arg(long, value_name = "NAME[:KEY=VALUE,...],...")]
     methods: Option<String>,
     /// Times that render and reconstruction together may take, as in 2s,5s,20s
@@ -132,7 +134,11 @@ fn methods(list: Option<&str>) -> Result<Vec<String>> {
         }
     }
     for (k, method) in methods.iter().enumerate() {
-        reconstruct::parse(method)?;
+        let (id, allocator) = adaptive::parse(method)?;
+        let made = reconstruct::parse(id)?;
+        if allocator.is_some_and(|allocator| allocator.needs_error()) && !made.estimates_error() {
+            bail!(Error::Usage(format!("{id} does not estimate its error: write {id}+adaptive=variance")));
+        }
         if methods[..k].contains(method) {
             bail!(Error::Usage(format!("method {method} is there twice")));
         }

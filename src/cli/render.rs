@@ -57,6 +57,15 @@ pub struct Args {
     /// Record the statistics of eight independent groups of samples in the layers
     #[arg(long, requires = "layers")]
     bins: bool,
+    /// Record ambient occlusion in the layers
+    #[arg(long, requires = "layers")]
+    occlusion: bool,
+    /// Record world positions in the layers
+    #[arg(long, requires = "layers")]
+    position: bool,
+    /// Record what an ambient light would add in the layers, by which `feature:ambient` sees what no path has lit
+    #[arg(long, requires = "layers")]
+    ambient: bool,
     /// JSON file for times, samples, memory and what was left out
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
@@ -107,7 +116,14 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         eprintln!("warning: nothing in {} emits light: the image is black", args.scene.display());
     }
     let saved = match &args.layers {
-        Some(_) => Needs { features: true, edges: method.needs().edges, bins: args.bins },
+        Some(_) => Needs {
+            features: true,
+            edges: method.needs().edges,
+            bins: args.bins,
+            occlusion: args.occlusion,
+            position: args.position,
+            ambient: args.ambient,
+        },
         None => Needs::default(),
     };
     let plan = Plan::new(&scene, method.needs(), saved);
@@ -283,7 +299,7 @@ fn replay(args: &Args, scene: &Scene, (x, y, index): (usize, usize, u32)) -> Res
         bail!(Error::Usage(format!("pixel {x},{y} is outside the film of {}x{}", sensor.width, sensor.height)));
     }
     let id = SampleId { seed: args.seed, x, y, index };
-    let sample = render::sample(scene, id, Some(&mut Tracer::new(shift(args))));
+    let sample = render::sample(scene, id, true, Some(&mut Tracer::new(shift(args), true)));
     println!("{sample:#?}");
     Ok(ExitCode::SUCCESS)
 }

@@ -1,7 +1,7 @@
 //! Film to frame: sums become means, and the two ends of every edge are joined.
 
 use super::sample::Moments;
-use super::{BINS, Film, Frame, Layer, Tile};
+use super::{BINS, Bin, Film, Frame, Layer, Tile};
 use crate::image::Image;
 
 /// Positions of right, left, down and up among a pixel's twelve edge values.
@@ -22,17 +22,16 @@ impl Film {
         frame.set(Layer::Samples, self.image(1, |tile, i, _| tile.counts[i] as f32));
         frame.set(Layer::Rejected, self.image(1, |tile, i, _| tile.rejected[i] as f32));
         if self.needs.features {
-            let features = [
-                (Layer::Albedo, Layer::AlbedoVariance, 0, 3),
-                (Layer::Normal, Layer::NormalVariance, 3, 3),
-                (Layer::Depth, Layer::DepthVariance, 6, 1),
-            ];
-            for (mean, variance, first, channels) in features {
-                frame.set(mean, self.image(channels, |tile, i, c| tile.features[i].mean[first + c]));
-                let value =
-                    |tile: &Tile, i: usize, c: usize| tile.features[i].variance_of_mean(first + c, tile.counts[i]);
-                frame.set(variance, self.image(channels, value));
-            }
+            self.develop_moments(&mut frame, [Layer::Albedo, Layer::AlbedoVariance], 0, |tile, i| &tile.features[i]);
+            self.develop_moments(&mut frame, [Layer::Normal, Layer::NormalVariance], 3, |tile, i| &tile.features[i]);
+            self.develop_moments(&mut frame, [Layer::Depth, Layer::DepthVariance], 6, |tile, i| &tile.features[i]);
+        }
+        if self.needs.occlusion {
+            let layers = [Layer::Occlusion, Layer::OcclusionVariance];
+            self.develop_moments(&mut frame, layers, 0, |tile, i| &tile.places[i]);
+        }
+        if self.needs.position {
+            self.develop_moments(&mut frame, [Layer::Position, Layer::PositionVariance], 1, |tile, i| &tile.places[i]);
         }
         if self.needs.edges {
             for (mean, variance, here, there) in
@@ -55,28 +54,44 @@ impl Film {
                 );
             }
         }
-        if self.needs.bins {
-            for k in 0..BINS {
-                self.develop_bin(&mut frame, k);
+        for k in 0..BINS as u8 {
+            if self.needs.bins {
+                let layers = [Layer::BinColor(k), Layer::BinDx(k), Layer::BinDy(k)];
+                self.develop_bin(&mut frame, layers, |tile, i| &tile.bins[i][k as usize]);
+            }
+            if self.needs.ambient {
+                let layers = [Layer::BinAmbient(k), Layer::BinAmbientDx(k), Layer::BinAmbientDy(k)];
+                self.develop_bin(&mut frame, layers, |tile, i| &tile.ambient[i][k as usize]);
             }
         }
         frame
     }
 
-    fn develop_bin(&self, frame: &mut Frame, k: usize) {
-        let number = k as u8;
-        frame.set(Layer::BinColor(number), self.image(3, |tile, i, c| tile.bins[i][k].color[c]));
+    /// Mean and variance of values from `first` on.
+    fn develop_moments<const N: usize>(
+        &self,
+        frame: &mut Frame,
+        [mean, variance]: [Layer; 2],
+        first: usize,
+        moments: fn(&Tile, usize) -> &Moments<N>,
+    ) {
+        let channels = mean.info().channels.len();
+        frame.set(mean, self.image(channels, |tile, i, c| moments(tile, i).mean[first + c]));
+        let of_mean = |tile: &Tile, i: usize, c| moments(tile, i).variance_of_mean(first + c, tile.counts[i]);
+        frame.set(variance, self.image(channels, of_mean));
+    }
+
+    fn develop_bin(&self, frame: &mut Frame, [color, dx, dy]: [Layer; 3], bin: impl Fn(&Tile, usize) -> &Bin) {
+        frame.set(color, self.image(3, |tile, i, c| bin(tile, i).color[c]));
         if !self.needs.edges {
             return;
         }
-        for (layer, step, here, there) in
-            [(Layer::BinDx(number), (1, 0), RIGHT, LEFT), (Layer::BinDy(number), (0, 1), DOWN, UP)]
-        {
+        for (layer, step, here, there) in [(dx, (1, 0), RIGHT, LEFT), (dy, (0, 1), DOWN, UP)] {
             frame.set(
                 layer,
                 self.edge_image(step, |tile, i, near, c| {
                     let end = if near { here } else { there } / 3;
-                    tile.bins[i][k].edges[end][c] * if near { 1.0 } else { -1.0 }
+                    bin(tile, i).edges[end][c] * if near { 1.0 } else { -1.0 }
                 }),
             );
         }

@@ -54,9 +54,13 @@ impl Frame {
             self.set(layer, black.clone());
         }
         for k in 0..BINS as u8 {
-            if self.get(Layer::BinColor(k)).is_some() {
-                self.set(Layer::BinDx(k), black.clone());
-                self.set(Layer::BinDy(k), black.clone());
+            for (color, edges) in [
+                (Layer::BinColor(k), [Layer::BinDx(k), Layer::BinDy(k)]),
+                (Layer::BinAmbient(k), [Layer::BinAmbientDx(k), Layer::BinAmbientDy(k)]),
+            ] {
+                if self.get(color).is_some() {
+                    edges.into_iter().for_each(|edge| self.set(edge, black.clone()));
+                }
             }
         }
     }

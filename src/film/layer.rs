@@ -25,6 +25,14 @@ pub enum Layer {
     Depth,
     /// Variance of [`Layer::Depth`].
     DepthVariance,
+    /// Ambient occlusion.
+    Occlusion,
+    /// Variance of [`Layer::Occlusion`].
+    OcclusionVariance,
+    /// World position.
+    Position,
+    /// Variance of [`Layer::Position`].
+    PositionVariance,
     /// Horizontal differences.
     Dx,
     /// Variance of [`Layer::Dx`].
@@ -43,6 +51,12 @@ pub enum Layer {
     BinDx(u8),
     /// Vertical differences of one bin.
     BinDy(u8),
+    /// Ambient light of one bin.
+    BinAmbient(u8),
+    /// Its horizontal differences.
+    BinAmbientDx(u8),
+    /// Its vertical differences.
+    BinAmbientDy(u8),
 }
 
 /// What is to be known of a layer.
@@ -77,7 +91,7 @@ const fn info(
 }
 
 /// Layers that are there once, in the order of the enumeration.
-const SINGLE: [(Layer, Info); 16] = [
+const SINGLE: [(Layer, Info); 20] = [
     (
         Layer::Color,
         info("", RGB, ["radiance", ">= 0", "always"], "scattered radiance without `direct`: mean of all samples"),
@@ -134,6 +148,32 @@ const SINGLE: [(Layer, Info); 16] = [
         info("depth_variance", Z, ["scene units²", ">= 0", "--layers"], "variance of the mean of the depth"),
     ),
     (
+        Layer::Occlusion,
+        info(
+            "occlusion",
+            Y,
+            ["1", "[0, 1]", "--occlusion"],
+            "ambient occlusion there: share of directions, by their cosine, that are open for a tenth of the scene",
+        ),
+    ),
+    (
+        Layer::OcclusionVariance,
+        info("occlusion_variance", Y, ["1", ">= 0", "--occlusion"], "variance of the mean of the occlusion"),
+    ),
+    (
+        Layer::Position,
+        info(
+            "position",
+            XYZ,
+            ["scene units", "any", "--position"],
+            "the point, in world space; beyond the scene where nothing is hit",
+        ),
+    ),
+    (
+        Layer::PositionVariance,
+        info("position_variance", XYZ, ["scene units²", ">= 0", "--position"], "variance of the mean of the position"),
+    ),
+    (
         Layer::Dx,
         info(
             "dx",
@@ -160,11 +200,23 @@ const SINGLE: [(Layer, Info); 16] = [
     ),
 ];
 
-const BINNED: [Info; 3] = [
+const BINNED: [Info; 6] = [
     info("bin", RGB, ["radiance", ">= 0", "--bins"], "colour of the samples whose number is k modulo 8"),
     info("bin_dx", RGB, ["radiance", "any", "--bins"], "dx of those samples"),
     info("bin_dy", RGB, ["radiance", "any", "--bins"], "dy of those samples"),
+    info(
+        "bin_ambient",
+        RGB,
+        ["1", ">= 0", "--ambient"],
+        "what an ambient light of radiance one, blocked by nothing, adds to their colour",
+    ),
+    info("bin_ambient_dx", RGB, ["1", "any", "--ambient"], "what it adds to their dx"),
+    info("bin_ambient_dy", RGB, ["1", "any", "--ambient"], "what it adds to their dy"),
 ];
+
+/// A bin's layers, in the order of [`BINNED`].
+const OF_BIN: [fn(u8) -> Layer; BINNED.len()] =
+    [Layer::BinColor, Layer::BinDx, Layer::BinDy, Layer::BinAmbient, Layer::BinAmbientDx, Layer::BinAmbientDy];
 
 impl Layer {
     /// Number of layers.
@@ -172,37 +224,44 @@ impl Layer {
 
     /// Every layer.
     pub fn all() -> impl Iterator<Item = Self> {
-        let bins = (0..BINS as u8).flat_map(|k| [Self::BinColor(k), Self::BinDx(k), Self::BinDy(k)]);
+        let bins = (0..BINS as u8).flat_map(|k| OF_BIN.map(|layer| layer(k)));
         SINGLE.iter().map(|(layer, _)| *layer).chain(bins)
     }
 
     /// Position among all layers.
     pub fn index(self) -> usize {
+        match self.bin() {
+            Some((which, k)) => SINGLE.len() + BINNED.len() * k as usize + which,
+            None => SINGLE.iter().position(|(layer, _)| *layer == self).unwrap_or_default(),
+        }
+    }
+
+    /// Row of [`BINNED`] and number of the bin.
+    fn bin(self) -> Option<(usize, u8)> {
         match self {
-            Self::BinColor(k) => SINGLE.len() + 3 * k as usize,
-            Self::BinDx(k) => SINGLE.len() + 3 * k as usize + 1,
-            Self::BinDy(k) => SINGLE.len() + 3 * k as usize + 2,
-            single => SINGLE.iter().position(|(layer, _)| *layer == single).unwrap_or_default(),
+            Self::BinColor(k) => Some((0, k)),
+            Self::BinDx(k) => Some((1, k)),
+            Self::BinDy(k) => Some((2, k)),
+            Self::BinAmbient(k) => Some((3, k)),
+            Self::BinAmbientDx(k) => Some((4, k)),
+            Self::BinAmbientDy(k) => Some((5, k)),
+            _ => None,
         }
     }
 
     /// The layer's row of the table; of a binned layer without its number.
     pub fn info(self) -> Info {
-        match self {
-            Self::BinColor(_) => BINNED[0],
-            Self::BinDx(_) => BINNED[1],
-            Self::BinDy(_) => BINNED[2],
-            single => SINGLE[single.index()].1,
+        match self.bin() {
+            Some((which, _)) => BINNED[which],
+            None => SINGLE[self.index()].1,
         }
     }
 
     /// Name in files, with the bin's number: `bin3_dx`.
     pub fn name(self) -> String {
-        match self {
-            Self::BinColor(k) => format!("bin{k}"),
-            Self::BinDx(k) => format!("bin{k}_dx"),
-            Self::BinDy(k) => format!("bin{k}_dy"),
-            single => single.info().name.to_owned(),
+        match self.bin() {
+            Some((which, k)) => BINNED[which].name.replacen("bin", &format!("bin{k}"), 1),
+            None => self.info().name.to_owned(),
         }
     }
 

@@ -28,6 +28,12 @@ pub struct Needs {
     pub edges: bool,
     /// Colour and edges for each of the [`BINS`].
     pub bins: bool,
+    /// Ambient occlusion with its variance.
+    pub occlusion: bool,
+    /// World position with its variance.
+    pub position: bool,
+    /// Bins of what an ambient light would add.
+    pub ambient: bool,
 }
 
 impl Needs {
@@ -37,15 +43,29 @@ impl Needs {
             features: self.features || other.features,
             edges: self.edges || other.edges,
             bins: self.bins || other.bins,
+            occlusion: self.occlusion || other.occlusion,
+            position: self.position || other.position,
+            ambient: self.ambient || other.ambient,
         }
     }
 }
 
-/// Means of one bin.
+/// Colour and edges, in the order of [`EDGES`]: of a sample, or the means of a bin.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Bin {
-    color: Rgb,
-    edges: [Rgb; 4],
+pub struct Bin {
+    /// Radiance.
+    pub color: Rgb,
+    /// One end's share of the differences neighbour minus pixel.
+    pub edges: [Rgb; 4],
+}
+
+impl Bin {
+    /// Takes in other means, which make up `share` of both.
+    fn add(&mut self, other: &Self, share: f32) {
+        self.color += (other.color - self.color) * share;
+        let edges = self.edges.iter_mut().zip(other.edges);
+        edges.for_each(|(mean, edge)| *mean += (edge - *mean) * share);
+    }
 }
 
 /// The statistics of a tile's pixels, row by row. A tile has one writer at a time, so nothing is locked.
@@ -65,10 +85,14 @@ pub struct Tile {
     direct: Vec<Moments<3>>,
     /// Albedo, normal and depth; empty when not needed.
     features: Vec<Moments<7>>,
+    /// Occlusion and position; empty when neither is needed.
+    places: Vec<Moments<4>>,
     /// Empty when not needed.
     edges: Vec<Moments<12>>,
     /// Empty when not needed.
     bins: Vec<[Bin; BINS]>,
+    /// Those of the ambient light; empty when not needed.
+    ambient: Vec<[Bin; BINS]>,
 }
 
 impl Tile {
@@ -85,8 +109,10 @@ impl Tile {
             color: vec![Moments::default(); pixels],
             direct: vec![Moments::default(); pixels],
             features: vec![Moments::default(); when(needs.features)],
+            places: vec![Moments::default(); when(needs.occlusion || needs.position)],
             edges: vec![Moments::default(); when(needs.edges)],
             bins: vec![[Bin::default(); BINS]; when(needs.bins)],
+            ambient: vec![[Bin::default(); BINS]; when(needs.ambient)],
         }
     }
 
@@ -113,13 +139,17 @@ impl Tile {
         if let Some(features) = self.features.get_mut(index) {
             features.add(sample.features.to_array(), share);
         }
+        if let Some(places) = self.places.get_mut(index) {
+            places.add(sample.features.place(), share);
+        }
         if let Some(edges) = self.edges.get_mut(index) {
             edges.add(sample::flatten(&sample.edges), share);
         }
         if let Some(bins) = self.bins.get_mut(index) {
-            let Bin { color, edges } = &mut bins[bin];
-            *color += (sample.color - *color) * bin_share;
-            edges.iter_mut().zip(sample.edges).for_each(|(mean, edge)| *mean += (edge - *mean) * bin_share);
+            bins[bin].add(&Bin { color: sample.color, edges: sample.edges }, bin_share);
+        }
+        if let Some(bins) = self.ambient.get_mut(index) {
+            bins[bin].add(&sample.ambient, bin_share);
         }
         outcome
     }
@@ -136,16 +166,17 @@ impl Tile {
             if let Some(features) = self.features.get_mut(index) {
                 features.merge(&other.features[index], n, share);
             }
+            if let Some(places) = self.places.get_mut(index) {
+                places.merge(&other.places[index], n, share);
+            }
             if let Some(edges) = self.edges.get_mut(index) {
                 edges.merge(&other.edges[index], n, share);
             }
-            if let Some(bins) = self.bins.get_mut(index) {
-                for (k, (mine, theirs)) in bins.iter_mut().zip(&other.bins[index]).enumerate() {
+            for (bins, theirs) in [(&mut self.bins, &other.bins), (&mut self.ambient, &other.ambient)] {
+                let Some(bins) = bins.get_mut(index) else { continue };
+                for (k, (mine, theirs)) in bins.iter_mut().zip(&theirs[index]).enumerate() {
                     let (a, b) = (sample::bin_count(n, k), sample::bin_count(m, k));
-                    let share = if b > 0 { b as f32 / (a + b) as f32 } else { 0.0 };
-                    mine.color += (theirs.color - mine.color) * share;
-                    let edges = mine.edges.iter_mut().zip(theirs.edges);
-                    edges.for_each(|(mean, edge)| *mean += (edge - *mean) * share);
+                    mine.add(theirs, if b > 0 { b as f32 / (a + b) as f32 } else { 0.0 });
                 }
             }
             self.counts[index] = n + m;
@@ -223,12 +254,19 @@ mod tests {
 
     fn sample(i: u32) -> Sample {
         let value = (i as f32 * 0.7).sin() + 1.5;
-        let features = Features { albedo: Rgb::splat(0.5), normal: Vec3::Z, depth: value };
-        Sample { color: vec3(value, 2.0, 0.0), direct: Rgb::ONE, features, edges: [Rgb::splat(value); 4] }
+        let features = Features {
+            albedo: Rgb::splat(0.5),
+            normal: Vec3::Z,
+            depth: value,
+            occlusion: 0.5 * value,
+            position: Vec3::splat(value),
+        };
+        let ambient = Bin { color: Rgb::splat(value), edges: [Rgb::splat(value); 4] };
+        Sample { color: vec3(value, 2.0, 0.0), direct: Rgb::ONE, features, edges: [Rgb::splat(value); 4], ambient }
     }
 
     fn all() -> Needs {
-        Needs { features: true, edges: true, bins: true }
+        Needs { features: true, edges: true, bins: true, occlusion: true, position: true, ambient: true }
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! What one camera path leaves behind, and the running moments it is added to.
 
-use super::BINS;
+use super::{BINS, Bin};
 use crate::math::{Rgb, Vec3};
 
 /// The neighbours that differences are taken to, as steps in x and y. Each edge is sampled from both ends.
@@ -15,12 +15,21 @@ pub struct Features {
     pub normal: Vec3,
     /// Length of the path so far, in scene units.
     pub depth: f32,
+    /// Ambient occlusion: 1 where a direction from there was open, 0 where it was not.
+    pub occlusion: f32,
+    /// The point, in world space.
+    pub position: Vec3,
 }
 
 impl Features {
     pub(super) fn to_array(self) -> [f32; 7] {
         let (a, n) = (self.albedo, self.normal);
         [a.x, a.y, a.z, n.x, n.y, n.z, self.depth]
+    }
+
+    pub(super) fn place(self) -> [f32; 4] {
+        let p = self.position;
+        [self.occlusion, p.x, p.y, p.z]
     }
 }
 
@@ -36,6 +45,8 @@ pub struct Sample {
     /// One end's share of the difference neighbour minus pixel, in the order of [`EDGES`]; zero across the
     /// image's border.
     pub edges: [Rgb; 4],
+    /// What an ambient light of radiance one, which nothing blocks, would add to the colour and the edges.
+    pub ambient: Bin,
 }
 
 /// Why a sample was not taken.
@@ -50,7 +61,10 @@ impl Sample {
         let finite = |ok: bool, what| if ok { Ok(()) } else { Err(Rejected(what)) };
         finite(self.color.is_finite(), "color")?;
         finite(self.direct.is_finite(), "direct")?;
-        finite(self.features.to_array().iter().all(|value| value.is_finite()), "features")?;
+        let mut features = self.features.to_array().into_iter().chain(self.features.place());
+        finite(features.all(f32::is_finite), "features")?;
+        let Bin { color, edges } = &self.ambient;
+        finite(color.is_finite() && edges.iter().all(|edge| edge.is_finite()), "ambient light")?;
         finite(self.edges.iter().all(|edge| edge.is_finite()), "edges")
     }
 }

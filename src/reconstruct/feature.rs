@@ -12,7 +12,7 @@ use crate::image::planes::Planes;
 pub const METHOD: Method = Method {
     id: "feature",
     summary: "Poisson reconstruction weighted by variances, bagged and cleaned: what `apr` takes as a feature; consistent",
-    parameters: &[generated::ROUNDS, generated::SCREEN, generated::VARIANCES, generated::PREFILTER],
+    parameters: &[generated::ROUNDS, generated::SCREEN, generated::VARIANCES, generated::PREFILTER, generated::AMBIENT],
     make,
 };
 
@@ -29,7 +29,7 @@ struct Feature {
 
 impl Reconstruction for Feature {
     fn needs(&self) -> Needs {
-        Needs { features: self.options.needs_features(), edges: true, bins: true }
+        self.options.needs()
     }
 
     fn estimates_error(&self) -> bool {

@@ -11,7 +11,7 @@ use super::features::{Feature, Kind};
 use super::inputs::Inputs;
 use super::{Parameter, Parameters};
 use crate::error::Result;
-use crate::film::{BINS, Layer, bin_count};
+use crate::film::{BINS, Layer, Needs, bin_count};
 use crate::image::nl_means::{self, Guide, Guides, rdfc};
 use crate::image::planes::Planes;
 use crate::math::rng;
@@ -25,6 +25,8 @@ pub struct Options {
     screen: f32,
     variances: Variances,
     prefilter: Prefilter,
+    /// Radiance of an ambient light that is added, over the typical luminance.
+    ambient: f32,
 }
 
 /// What differences are weighted by.
@@ -67,6 +69,13 @@ pub const PREFILTER: Parameter = Parameter {
     summary: "what cleans the feature: rdfc by albedo and normal too, nlm by itself as published, or off",
 };
 
+/// See [`ROUNDS`].
+pub const AMBIENT: Parameter = Parameter {
+    name: "ambient",
+    default: "0",
+    summary: "radiance of a light that reaches everything, in the feature only, over the typical luminance, 0 to 1",
+};
+
 impl Options {
     /// Reads the parameters.
     pub fn new(parameters: &Parameters) -> Result<Self> {
@@ -75,6 +84,7 @@ impl Options {
         Ok(Self {
             rounds: parameters.get(ROUNDS.name, "a number from 2 to 100", |n| (2..=100).contains(n))?,
             screen: parameters.get(SCREEN.name, "a number in [0, 1]", |n| (0.0..=1.0).contains(n))?,
+            ambient: parameters.get(AMBIENT.name, "a number in [0, 1]", |n| (0.0..=1.0).contains(n))?,
             variances: if variances == "samples" { Variances::Samples } else { Variances::Draws },
             prefilter: match prefilter.as_str() {
                 "rdfc" => Prefilter::Rdfc,
@@ -84,14 +94,15 @@ impl Options {
         })
     }
 
-    /// Whether albedo and normal are asked for.
-    pub fn needs_features(&self) -> bool {
-        self.prefilter == Prefilter::Rdfc
+    /// What must be rendered.
+    pub fn needs(&self) -> Needs {
+        let features = self.prefilter == Prefilter::Rdfc;
+        Needs { features, edges: true, bins: true, ambient: self.ambient > 0.0, ..Needs::default() }
     }
 
     /// The same without albedo and normal.
     pub fn without_features(self) -> Self {
-        let prefilter = if self.needs_features() { Prefilter::NonLocalMeans } else { self.prefilter };
+        let prefilter = if self.needs().features { Prefilter::NonLocalMeans } else { self.prefilter };
         Self { prefilter, ..self }
     }
 }
@@ -142,14 +153,14 @@ pub fn error(variance: &Planes, own: &Planes) -> Planes {
 /// The feature and the variance of its mean, sum over the channels.
 fn bagged(inputs: &Inputs, options: &Options, progress: &dyn Fn(f32)) -> Result<Guide> {
     let (width, height) = (inputs.frame.width, inputs.frame.height);
-    let groups = Groups::of(inputs)?;
-    let (all, mut weights) = match options.variances {
-        Variances::Samples => (groups.draw(&[[1; BINS]; 3]).0, weights(&of_samples(inputs)?, options.screen)),
-        Variances::Draws => {
-            let (means, variances) = groups.draw(&[[1; BINS]; 3]);
-            (means, weights(&variances, options.screen))
-        }
-    };
+    let groups = Groups::of(inputs, options.ambient)?;
+    let (all, of_draw) = groups.draw(&[[1; BINS]; 3]);
+    // The ambient light's variances are only known from groups.
+    let by_samples = options.variances == Variances::Samples && options.ambient == 0.0;
+    let variances = if by_samples { of_samples(inputs)? } else { of_draw };
+    let smooth = options.variances == Variances::Samples;
+    let variances = if smooth { variances.map(|variances| averaged(variances, (width, height))) } else { variances };
+    let mut weights = weights(&variances, options.screen);
     let mut solver = weights.solver(width);
     let [color, dx, dy] = all;
     let right = weights.right(Data { width, data: &color, edges: [&dx, &dy] });
@@ -190,14 +201,20 @@ fn weights([color, dx, dy]: &[Vec<f32>; 3], screen: f32) -> Weights {
     Weights { across: weigh(dx, 1.0), down: weigh(dy, 1.0), screen: weigh(color, screen.max(PIN)) }
 }
 
-/// Variances of colour and differences, sums over the channels, averaged over 3x3 pixels: those of single pixels are
-/// small where outliers happen to be missing, and follow what they are to weigh.
+/// Variances of colour and differences, sums over the channels.
 fn of_samples(inputs: &Inputs) -> Result<[Vec<f32>; 3]> {
-    let smooth = |layer| {
-        let variance = inputs.planes(layer, inputs.scale * inputs.scale)?.sum().box_mean(1);
-        Ok(variance.to_image(inputs.frame.width, inputs.frame.height, 1.0).data)
+    let sum = |layer| {
+        let quads = inputs.quads(layer)?;
+        Ok(quads.par_iter().map(|[r, g, b, _]| (r + g + b) * inputs.scale).collect())
     };
-    Ok([smooth(Layer::ColorVariance)?, smooth(Layer::DxVariance)?, smooth(Layer::DyVariance)?])
+    Ok([sum(Layer::ColorVariance)?, sum(Layer::DxVariance)?, sum(Layer::DyVariance)?])
+}
+
+/// Means over 3x3 pixels: variances of single ones are small where outliers happen to be missing, and follow what they
+/// are to weigh.
+fn averaged(values: Vec<f32>, (width, height): (usize, usize)) -> Vec<f32> {
+    let planes = Planes::from_fn(width, height, 1, |_, x, y| values[y * width + x]);
+    planes.box_mean(1).to_image(width, height, 1.0).data
 }
 
 /// How often each group is drawn.
@@ -216,26 +233,30 @@ fn draw(round: u32, which: u64) -> Draw {
 
 /// The samples of colour and differences in groups.
 struct Groups<'a> {
-    /// For each of the three, the groups' images and the step to the pixel that it also takes samples of.
-    layers: [(Vec<&'a [f32]>, usize); 3],
+    /// For each of the three, the groups' images, those of the ambient light if it is on, and the step to the pixel that it
+    /// also takes samples of.
+    layers: [(Vec<&'a [f32]>, Vec<&'a [f32]>, usize); 3],
     counts: &'a [f32],
     scale: f32,
+    ambient: f32,
 }
 
 impl<'a> Groups<'a> {
-    fn of(inputs: &Inputs<'a>) -> Result<Self> {
+    fn of(inputs: &Inputs<'a>, ambient: f32) -> Result<Self> {
         let images = |layer: fn(u8) -> Layer| {
             let image = |k| Ok(inputs.frame.require(layer(k))?.data.as_slice());
             (0..BINS as u8).map(image).collect::<Result<Vec<_>>>()
         };
+        let lit = |layer| if ambient > 0.0 { images(layer) } else { Ok(Vec::new()) };
         Ok(Self {
             layers: [
-                (images(Layer::BinColor)?, 0),
-                (images(Layer::BinDx)?, 1),
-                (images(Layer::BinDy)?, inputs.frame.width),
+                (images(Layer::BinColor)?, lit(Layer::BinAmbient)?, 0),
+                (images(Layer::BinDx)?, lit(Layer::BinAmbientDx)?, 1),
+                (images(Layer::BinDy)?, lit(Layer::BinAmbientDy)?, inputs.frame.width),
             ],
             counts: &inputs.frame.require(Layer::Samples)?.data,
             scale: inputs.scale,
+            ambient,
         })
     }
 
@@ -249,7 +270,7 @@ impl<'a> Groups<'a> {
     }
 
     fn pixel(&self, which: usize, draw: &Draw, i: usize) -> (Quad, f32) {
-        let (images, step) = &self.layers[which];
+        let (images, lit, step) = &self.layers[which];
         let Some(&far) = self.counts.get(i + step) else { return ([0.0; 4], 0.0) };
         let samples = self.counts[i].min(far) as u32;
         let counts: Draw = std::array::from_fn(|k| bin_count(samples, k));
@@ -260,7 +281,10 @@ impl<'a> Groups<'a> {
         let share = 1.0 / weights.iter().sum::<f32>().max(1.0);
         let (mut mean, mut squares) = ([0.0; 4], 0.0);
         for c in 0..3 {
-            let values: [f32; BINS] = std::array::from_fn(|k| images[k][3 * i + c] * self.scale);
+            let mut values: [f32; BINS] = std::array::from_fn(|k| images[k][3 * i + c] * self.scale);
+            for (value, image) in values.iter_mut().zip(lit) {
+                *value += image[3 * i + c] * self.ambient;
+            }
             mean[c] = share * (0..BINS).map(|k| weights[k] * values[k]).sum::<f32>();
             squares += (0..BINS).map(|k| weights[k] * (values[k] - mean[c]).powi(2)).sum::<f32>();
         }

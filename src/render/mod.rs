@@ -45,12 +45,16 @@ impl View {
 }
 
 /// Renders a single sample: the base path alone, or with its differences to the four neighbours.
-pub fn sample(scene: &Scene, id: SampleId, gradient: Option<&mut gradient::Tracer>) -> Sample {
+pub fn sample(scene: &Scene, id: SampleId, occlusion: bool, gradient: Option<&mut gradient::Tracer>) -> Sample {
     let sampler = Sampler::new(id, scene.sensor().width);
     let [u, v, lens_u, lens_v] = sampler.camera();
     let view = View { film: vec2(id.x as f32 + u, id.y as f32 + v), lens: vec2(lens_u, lens_v) };
-    match gradient {
+    let mut sample = match gradient {
         None => path::trace(scene, &sampler, view, &mut ()),
         Some(tracer) => tracer.sample(scene, &sampler, view, id),
+    };
+    if occlusion {
+        sample.features.occlusion = path::occlusion(scene, &sample.features, sampler.occlusion());
     }
+    sample
 }

@@ -3,10 +3,11 @@
 
 use super::{Sampler, View};
 use crate::film::{Features, Sample};
-use crate::math::{Rgb, Vec2, Vec3, vec2};
+use crate::math::frame::Frame;
+use crate::math::{Rgb, Vec2, Vec3, vec2, warp};
 use crate::scene::bsdf::{BsdfSample, Eval, Lobe};
 use crate::scene::emitter::LightPoint;
-use crate::scene::{Scene, Surface};
+use crate::scene::{Ray, Scene, Surface};
 
 /// Chance of surviving Russian roulette is never above this, so that paths in white rooms end.
 const MAX_SURVIVAL: f32 = 0.95;
@@ -70,7 +71,7 @@ fn power_heuristic(p: f32, q: f32) -> f32 {
 pub fn trace(scene: &Scene, sampler: &Sampler, view: View, recorder: &mut impl Recorder) -> Sample {
     let integrator = scene.integrator();
     let mut ray = view.ray(scene);
-    let mut sample = Sample { features: far(scene, ray.origin), ..Sample::default() };
+    let mut sample = Sample { features: far(scene, ray), ..Sample::default() };
     let (mut throughput, mut eta, mut depth) = (Rgb::ONE, 1.0, 0);
     let mut features = FeatureWalk::default();
     // Where the last direction came from, with its density; none for the camera.
@@ -120,6 +121,7 @@ pub fn trace(scene: &Scene, sampler: &Sampler, view: View, recorder: &mut impl R
             break;
         }
         throughput /= chance;
+        sample.ambient.color += throughput;
         recorder.scatter(Scatter { bsdf: scattered, survival: chance });
         features.pass(&scattered);
         last = Some((surface.p, scattered));
@@ -159,7 +161,8 @@ impl FeatureWalk {
             let tint = self.tint.unwrap_or(Rgb::ONE);
             let side = if surface.wi.z < 0.0 { -1.0 } else { 1.0 };
             let albedo = scene.bsdf(surface).albedo(surface) * tint;
-            *features = Features { albedo, normal: surface.frame.n * side, depth: self.length };
+            let (normal, depth) = (surface.frame.n * side, self.length);
+            *features = Features { albedo, normal, depth, position: surface.p, ..*features };
         }
         self.found = smooth;
     }
@@ -174,8 +177,21 @@ impl FeatureWalk {
     }
 }
 
+/// Ambient occlusion reaches so far, over the size of the scene.
+const OPEN: f32 = 0.1;
+
+/// Whether a direction from the features' surface, chosen by its cosine, is open: 1 or 0.
+pub fn occlusion(scene: &Scene, features: &Features, u: Vec2) -> f32 {
+    if features.normal == Vec3::ZERO {
+        return 1.0;
+    }
+    let direction = Frame::around(features.normal).to_world(warp::cosine_hemisphere(u));
+    f32::from(u8::from(scene.is_open(features.position, features.normal, direction, OPEN)))
+}
+
 /// The features of a ray that meets nothing: beyond everything.
-fn far(scene: &Scene, origin: Vec3) -> Features {
+fn far(scene: &Scene, Ray { origin, direction, .. }: Ray) -> Features {
     let (center, radius) = scene.bounds().sphere();
-    Features { depth: origin.distance(center) + radius, ..Features::default() }
+    let depth = origin.distance(center) + radius;
+    Features { depth, position: origin + direction * depth, occlusion: 1.0, ..Features::default() }
 }

@@ -6,7 +6,7 @@
 
 use super::SampleId;
 use crate::film::BINS;
-use crate::math::rng;
+use crate::math::{Vec2, rng, vec2};
 
 /// Dimension sets of four that the sequence has; later bounces fall back to hashing.
 const SETS: u32 = sobol_burley::NUM_DIMENSION_SETS_4D;
@@ -42,6 +42,12 @@ impl Sampler {
     /// Choice of lobe and direction at that vertex.
     pub fn scatter(&self, depth: u32) -> [f32; 4] {
         self.set(2 * depth + 2)
+    }
+
+    /// A direction for ambient occlusion.
+    pub fn occlusion(&self) -> Vec2 {
+        let [u, v, ..] = self.set(u32::MAX >> 2);
+        vec2(u, v)
     }
 
     #[inline]

@@ -140,7 +140,8 @@ fn run_wave(scene: &Scene, settings: Settings, control: &Control, outcome: &mut 
 }
 
 fn run_tile(scene: &Scene, settings: Settings, tile: &mut Tile, wave: Wave) -> Option<(SampleId, Rejected)> {
-    let mut tracer = settings.needs.edges.then(|| Tracer::new(settings.shift));
+    let Needs { occlusion, edges, ambient, .. } = settings.needs;
+    let mut tracer = edges.then(|| Tracer::new(settings.shift, ambient));
     let mut first_rejected = None;
     let at = |pixel: usize, tile: &Tile| (tile.x + pixel % tile.width, tile.y + pixel / tile.width);
     let counts: Vec<u32> = (0..tile.width * tile.height).map(|pixel| at(pixel, tile)).map(|(x, y)| wave(x, y)).collect();
@@ -148,7 +149,7 @@ fn run_tile(scene: &Scene, settings: Settings, tile: &mut Tile, wave: Wave) -> O
         for pixel in (0..counts.len()).filter(|&pixel| turn < counts[pixel]) {
             let (x, y) = at(pixel, tile);
             let id = SampleId { seed: settings.seed, x, y, index: settings.first + tile.count(pixel) };
-            if let Err(reason) = tile.add(pixel, &sample(scene, id, tracer.as_mut())) {
+            if let Err(reason) = tile.add(pixel, &sample(scene, id, occlusion, tracer.as_mut())) {
                 first_rejected.get_or_insert((id, reason));
             }
         }

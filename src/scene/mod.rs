@@ -176,6 +176,13 @@ impl Scene {
         !self.accel.blocked(a.leave(b.p - a.p), b.leave(a.p - b.p))
     }
 
+    /// Whether nothing is met from a point on a surface with this normal along `direction`, for a `share` of the scene's
+    /// size.
+    pub fn is_open(&self, p: Vec3, n: Vec3, direction: Vec3, share: f32) -> bool {
+        let from = surface::offset(p, n, self.epsilon(p), direction);
+        !self.accel.blocked(from, from + direction * (share * self.accel.size()))
+    }
+
     /// The material of a surface.
     pub fn bsdf(&self, surface: &Surface) -> &dyn Bsdf {
         &*self.shapes[surface.at.shape as usize].bsdf

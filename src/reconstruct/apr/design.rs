@@ -4,8 +4,8 @@
 use super::blocks::coordinates;
 use crate::math::lanes::Lanes;
 
-/// Most features: normal, albedo, depth, occlusion and the generated one.
-pub const FEATURES: usize = 11;
+/// Most features: normal, albedo, depth, occlusion, position and the generated one.
+pub const FEATURES: usize = 14;
 
 /// Monomials of two variables up to the third degree.
 pub const MONOMIALS: usize = 10;

@@ -30,7 +30,7 @@ pub const METHOD: Method = Method {
         Parameter {
             name: "features",
             default: "normal+albedo+depth+generated",
-            summary: "what colours are linear in, out of normal, albedo, depth and generated, with + between; or none",
+            summary: "what colours are linear in, out of normal, albedo, depth, occlusion, position and generated",
         },
         Parameter { name: "order", default: "0-3", summary: "orders of the polynomials that compete, 0 to 3" },
         Parameter {
@@ -52,6 +52,7 @@ pub const METHOD: Method = Method {
         generated::SCREEN,
         generated::VARIANCES,
         generated::PREFILTER,
+        generated::AMBIENT,
     ],
     make,
 };
@@ -66,10 +67,12 @@ const SMOOTHING: usize = 3;
 const LEAST: f32 = 1e-4;
 
 /// A feature by its name, with the layers that hold it and its variance.
-const LAYERS: [(&str, Layer, Layer); 3] = [
+const LAYERS: [(&str, Layer, Layer); 5] = [
     ("normal", Layer::Normal, Layer::NormalVariance),
     ("albedo", Layer::Albedo, Layer::AlbedoVariance),
     ("depth", Layer::Depth, Layer::DepthVariance),
+    ("occlusion", Layer::Occlusion, Layer::OcclusionVariance),
+    ("position", Layer::Position, Layer::PositionVariance),
 ];
 
 struct Apr {
@@ -86,7 +89,7 @@ struct Apr {
 fn make(parameters: &Parameters) -> Result<Box<dyn Reconstruction>> {
     let known = |name: &str| name == "generated" || LAYERS.iter().any(|(layer, ..)| *layer == name);
     let all = |text: &String| text == "none" || text.split('+').all(known);
-    let features: String = parameters.get("features", "none, or some of normal+albedo+depth+generated", all)?;
+    let features: String = parameters.get("features", "none, or some of normal+albedo+depth+occlusion+position+generated", all)?;
     let named = |name: &str| features.split('+').any(|feature| feature == name);
     let layers: Vec<usize> = (0..LAYERS.len()).filter(|&k| named(LAYERS[k].0)).collect();
     let options = Options::new(parameters)?;
@@ -116,8 +119,14 @@ fn make(parameters: &Parameters) -> Result<Box<dyn Reconstruction>> {
 
 impl Reconstruction for Apr {
     fn needs(&self) -> Needs {
-        let features = !self.layers.is_empty() || self.generated.as_ref().is_some_and(Options::needs_features);
-        Needs { features, edges: self.generated.is_some(), bins: self.generated.is_some() }
+        let named = |name| self.layers.iter().any(|&k| LAYERS[k].0 == name);
+        let own = Needs {
+            features: named("normal") || named("albedo") || named("depth"),
+            occlusion: named("occlusion"),
+            position: named("position"),
+            ..Needs::default()
+        };
+        own.union(self.generated.as_ref().map(Options::needs).unwrap_or_default())
     }
 
     fn estimates_error(&self) -> bool {

@@ -88,6 +88,12 @@ pub fn refract(wi: Vec3, wo: Vec3, offset_wi: Vec3, eta: f32) -> Option<(Vec3, f
 }
 
 impl Extended {
+    /// The offset's last segment to an ambient light that nothing blocks.
+    pub fn to_ambient(&self) -> End {
+        let Copied { value, pdf, jacobian, .. } = self.copied;
+        End { value, pdf, light_pdf: 0.0, radiance: Rgb::ONE, jacobian }
+    }
+
     /// The offset's last segment when the base path's leads to the emitter point `target`: its own way has to lead
     /// to an emitter too, and to infinity only with the base's.
     pub fn end(&self, scene: &Scene, offset: &Surface, target: &LightPoint) -> Option<End> {

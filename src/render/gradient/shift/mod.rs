@@ -4,10 +4,8 @@ pub mod half_vector;
 pub mod reconnect;
 mod walk;
 
-use self::walk::Walk;
-use super::base_path::BasePath;
+pub use self::walk::Walk;
 use crate::math::Rgb;
-use crate::scene::{Ray, Scene};
 
 /// How the base path of a pixel becomes a path of its neighbour.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,12 +30,6 @@ impl Default for Shift {
         let (_, shift, _) = SHIFTS[0];
         shift
     }
-}
-
-/// This end's share of (neighbour - pixel) by reconnection: the sum of (J f(y) - f(x)) / D over the path's
-/// contributions. `ray` is the neighbour's camera ray.
-pub fn reconnected(scene: &Scene, base: &BasePath, threshold: f32, ray: Ray) -> Rgb {
-    Walk::new(scene, threshold).along(&base.vertices[..base.lit_length()], ray)
 }
 
 /// The offset's own last segment, to an emitter.

@@ -62,3 +62,10 @@ pub fn to_light(scene: &Scene, base: &Surface, offset: &Surface, point: &LightPo
     let light_pdf = scene.emitter_pdf(offset.p, point);
     Some(End { value: eval.value, pdf: point.scatter_pdf(eval.pdf), light_pdf, radiance, jacobian })
 }
+
+/// From `offset` the way that `base` is left by, to an ambient light that nothing blocks. `None` when it carries nothing.
+pub fn to_ambient(scene: &Scene, base: &Surface, wo: Vec3, offset: &Surface) -> Option<End> {
+    let eval = scene.bsdf(offset).eval(offset, offset.wi, offset.to_local(base.frame.to_world(wo)));
+    let end = End { value: eval.value, pdf: eval.pdf, light_pdf: 0.0, radiance: Rgb::ONE, jacobian: 1.0 };
+    (eval.value != Rgb::ZERO).then_some(end)
+}

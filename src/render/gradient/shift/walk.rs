@@ -4,7 +4,7 @@ use super::half_vector::{self, Extended};
 use super::reconnect::{self, Connection};
 use super::{End, Rgb};
 use crate::math::Vec3;
-use crate::render::gradient::base_path::Vertex;
+use crate::render::gradient::base_path::{BasePath, Vertex};
 use crate::render::path::{Emission, Light, Scatter};
 use crate::scene::bsdf::Lobe;
 use crate::scene::{Ray, Scene, Surface};
@@ -67,15 +67,10 @@ struct Segment<'a> {
 }
 
 impl Segment<'_> {
-    /// f(x) of the emission at the segment's end, before division by the segment's density.
-    fn base(&self, emission: &Emission) -> Rgb {
+    /// f(x) of light at the segment's end, before division by the segment's density.
+    fn base(&self, radiance: Rgb) -> Rgb {
         let Scatter { bsdf, survival } = self.scatter;
-        self.vertex.throughput * bsdf.weight * emission.radiance * (bsdf.pdf / survival)
-    }
-
-    /// Density of the segment by both strategies.
-    fn density(&self, emission: &Emission) -> f32 {
-        self.scatter.bsdf.pdf + emission.light_pdf
+        self.vertex.throughput * bsdf.weight * radiance * (bsdf.pdf / survival)
     }
 
     /// The prefix behind the segment, which the offset scatters over with `value` and `pdf`, all Jacobians in.
@@ -94,21 +89,52 @@ struct Contribution {
     scale: f32,
 }
 
-/// The sum of (J f(y) - f(x)) / D so far.
+impl Contribution {
+    /// Difference when the shift has failed.
+    fn alone(self) -> Rgb {
+        -self.base / self.density
+    }
+
+    /// Difference to J f(y), of J times the density given, both relative to the base's prefix.
+    fn pair(self, offset: Rgb, shifted: f32) -> Rgb {
+        if offset == Rgb::ZERO || shifted <= 0.0 {
+            return self.alone();
+        }
+        (offset * self.scale - self.base) / (self.density + shifted)
+    }
+
+    /// Difference to an offset that has its last segment for itself, or none.
+    fn end(self, prefix: Prefix, end: Option<End>) -> Rgb {
+        end.map_or_else(
+            || self.alone(),
+            |end| {
+                let offset = prefix.throughput * end.value * end.radiance * end.jacobian;
+                self.pair(offset, prefix.ratio * end.jacobian * (end.light_pdf + end.pdf))
+            },
+        )
+    }
+}
+
+/// This end's share of (neighbour - pixel) by reconnection: the sum of (J f(y) - f(x)) / D over the contributions so far.
 pub struct Walk<'a> {
     scene: &'a Scene,
     threshold: f32,
     difference: Rgb,
+    /// That of the ambient light, if it is asked for.
+    ambient: Option<Rgb>,
 }
 
 impl<'a> Walk<'a> {
     /// Nothing yet. Smooth lobes of roughness above `threshold` count as diffuse.
-    pub fn new(scene: &'a Scene, threshold: f32) -> Self {
-        Self { scene, threshold, difference: Rgb::ZERO }
+    pub fn new(scene: &'a Scene, threshold: f32, ambient: bool) -> Self {
+        Self { scene, threshold, difference: Rgb::ZERO, ambient: ambient.then_some(Rgb::ZERO) }
     }
 
-    /// Walks along the vertices that light reaches, with an offset that starts with `ray`.
-    pub fn along(mut self, lit: &[Vertex], ray: Ray) -> Rgb {
+    /// Walks along the base path as far as light reaches, with an offset that starts with `ray`. Returns the differences
+    /// in the scene's light and in the ambient one.
+    pub fn along(mut self, base: &BasePath, ray: Ray) -> (Rgb, Rgb) {
+        let end = if self.ambient.is_some() { base.vertices.len() } else { base.lit_length() };
+        let lit = &base.vertices[..end];
         let start = Prefix { throughput: Rgb::ONE, ratio: 1.0 };
         let mut states =
             States::from(self.scene.intersect_from_camera(ray).map(|surface| State::Apart(start, surface)));
@@ -118,13 +144,13 @@ impl<'a> Walk<'a> {
             }
             let next = lit.get(k + 1);
             match &vertex.scatter {
-                Some(scatter) if next.is_some() || vertex.emission.is_some() => {
+                Some(scatter) if next.is_some() || vertex.emission.is_some() || self.ambient.is_some() => {
                     states = self.advance(Segment { vertex, scatter }, states.scatter, next);
                 }
                 _ => break,
             }
         }
-        self.difference
+        (self.difference, self.ambient.unwrap_or_default())
     }
 
     fn is_diffuse(&self, roughness: Option<f32>) -> bool {
@@ -141,25 +167,23 @@ impl<'a> Walk<'a> {
 
     /// A contribution of the base alone: the shift has failed.
     fn add_base_only(&mut self, of: Contribution) {
-        self.difference -= of.base / of.density;
+        self.difference += of.alone();
     }
 
     /// A contribution of both: J f(y) and J times the offset's density, both relative to the base's prefix.
     fn add_pair(&mut self, of: Contribution, offset: Rgb, shifted: f32) {
-        if offset == Rgb::ZERO || shifted <= 0.0 {
-            return self.add_base_only(of);
-        }
-        self.difference += (offset * of.scale - of.base) / (of.density + shifted);
+        self.difference += of.pair(offset, shifted);
     }
 
     /// A contribution of which the offset has its last segment for itself, or none.
     fn add_end(&mut self, of: Contribution, prefix: Prefix, end: Option<End>) {
-        match end {
-            Some(end) => {
-                let offset = prefix.throughput * end.value * end.radiance * end.jacobian;
-                self.add_pair(of, offset, prefix.ratio * end.jacobian * (end.light_pdf + end.pdf));
-            }
-            None => self.add_base_only(of),
+        self.difference += of.end(prefix, end);
+    }
+
+    /// The ambient light at the end of a segment, if it is asked for: as from an environment that nothing blocks.
+    fn add_ambient(&mut self, segment: Segment, difference: impl FnOnce(Contribution) -> Rgb) {
+        if let Some(sum) = &mut self.ambient {
+            *sum += difference(contribution(segment, (Rgb::ONE, 0.0)));
         }
     }
 
@@ -199,8 +223,9 @@ impl<'a> Walk<'a> {
         match state {
             State::Failed => {
                 if let Some(emission) = &vertex.emission {
-                    self.add_base_only(contribution(segment, emission));
+                    self.add_base_only(emitted(segment, emission));
                 }
+                self.add_ambient(segment, Contribution::alone);
                 State::Failed.into()
             }
             State::Joined(prefix) => {
@@ -214,15 +239,20 @@ impl<'a> Walk<'a> {
                 if self.scatters_diffusely(scatter, vertex) && self.is_diffuse_at(&surface) {
                     if let Some(emission) = &vertex.emission {
                         let end = reconnect::to_light(self.scene, &vertex.surface, &surface, &emission.point);
-                        self.add_end(contribution(segment, emission), prefix, end);
+                        self.add_end(emitted(segment, emission), prefix, end);
                     }
+                    let (scene, from) = (self.scene, &vertex.surface);
+                    self.add_ambient(segment, |of| {
+                        of.end(prefix, reconnect::to_ambient(scene, from, scatter.bsdf.wo, &surface))
+                    });
                     return next.map_or(State::Failed.into(), |next| self.join(segment, prefix, &surface, next));
                 }
                 let extended = self.extend(segment, &surface);
                 if let Some(emission) = &vertex.emission {
                     let end = extended.as_ref().and_then(|found| found.end(self.scene, &surface, &emission.point));
-                    self.add_end(contribution(segment, emission), prefix, end);
+                    self.add_end(emitted(segment, emission), prefix, end);
                 }
+                self.add_ambient(segment, |of| of.end(prefix, extended.as_ref().map(Extended::to_ambient)));
                 extended.and_then(|extended| self.apart(segment, prefix, &extended)).into()
             }
         }
@@ -232,8 +262,9 @@ impl<'a> Walk<'a> {
     fn go_on(&mut self, segment: Segment, prefix: Prefix, value: Rgb, pdf: f32) -> States {
         if let Some(emission) = &segment.vertex.emission {
             let offset = prefix.throughput * value * emission.radiance;
-            self.add_pair(contribution(segment, emission), offset, prefix.ratio * (pdf + emission.light_pdf));
+            self.add_pair(emitted(segment, emission), offset, prefix.ratio * (pdf + emission.light_pdf));
         }
+        self.add_ambient(segment, |of| of.pair(prefix.throughput * value, prefix.ratio * pdf));
         segment.extend(prefix, value, pdf).map(State::Joined).into()
     }
 
@@ -284,7 +315,13 @@ impl<'a> Walk<'a> {
     }
 }
 
-fn contribution(segment: Segment, emission: &Emission) -> Contribution {
-    let (base, density) = (segment.base(emission), segment.density(emission));
-    Contribution { base, density, scale: 1.0 / segment.scatter.survival }
+/// The contribution of an emitter at the end of a segment.
+fn emitted(segment: Segment, emission: &Emission) -> Contribution {
+    contribution(segment, (emission.radiance, emission.light_pdf))
+}
+
+/// The contribution of light at the end of a segment, with the density of choosing it otherwise.
+fn contribution(segment: Segment, (radiance, light_pdf): (Rgb, f32)) -> Contribution {
+    let scale = 1.0 / segment.scatter.survival;
+    Contribution { base: segment.base(radiance), density: segment.scatter.bsdf.pdf + light_pdf, scale }
 }
