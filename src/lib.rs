@@ -2,6 +2,8 @@
 //!
 //! ```text
 //! scene -> render (waves of tiles) -> Film --develop--> Frame -> reconstruct -> Solution -> metrics
+//!              ^                                          |            |
+//!              +----------------- adaptive: allocate <----+------------+
 //! ```
 //!
 //! A **sample** is what one camera path leaves behind; samples are dealt to **bins**. An **edge** is the difference to
@@ -22,9 +24,11 @@ pub mod film;
 pub mod plan;
 pub mod render;
 
-pub mod metrics;
 pub mod reconstruct;
+
 pub mod adaptive;
+
+pub mod metrics;
 pub mod reference;
 pub mod validate;
 

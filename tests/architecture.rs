@@ -15,10 +15,11 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("plan", &["scene", "film"]),
     ("render", &["scene", "film", "plan", "image", "math"]),
     ("reconstruct", &["film", "image", "solve", "math"]),
+    ("adaptive", &["scene", "render", "film", "reconstruct", "image", "math"]),
     ("metrics", &["image", "math"]),
     ("reference", &["scene", "film", "render", "image", "math"]),
     ("validate", &["scene", "reference", "image"]),
-    ("bench", &["scene", "plan", "film", "render", "image", "math", "reconstruct", "reference", "metrics"]),
+    ("bench", &["scene", "plan", "film", "render", "image", "math", "reconstruct", "adaptive", "reference", "metrics"]),
     ("report", &["bench", "image", "math", "metrics"]),
 ];
 

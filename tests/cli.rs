@@ -77,7 +77,10 @@ fn figures_come_as_json_with_the_promised_keys() {
         (Some(2), Some(512), Some(0))
     );
     assert!(stats["peak_bytes"].as_u64().unwrap() > 1 << 20);
-    assert_eq!((stats["method"].as_str(), stats["plan"].as_str()), (Some("frgr"), Some("+gradients +features -bins")));
+    assert_eq!(
+        (stats["method"].as_str(), stats["plan"].as_str()),
+        (Some("frgr"), Some("+gradients +features -bins -occlusion -position -ambient"))
+    );
     let output =
         fluxion(folder.path()).args(["compare", "a.exr", "a.exr", "--json", "--map", "map.png"]).output().unwrap();
     let figures: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
@@ -197,4 +200,40 @@ fn an_interrupt_ends_after_the_running_tiles_and_writes_what_is_there() {
     assert!(child.0.wait().unwrap().success());
     let image = read_color(&folder.path().join("a.exr")).unwrap();
     assert!(image.data.iter().sum::<f32>() > 0.0);
+}
+
+#[test]
+fn adaptive_renders_hold_their_counts_and_errors() {
+    let folder = tempfile::tempdir().unwrap();
+    let render = |extra: &[&str]| {
+        let arguments = ["-o", "a.exr", "--size", "40x30", "--json", "a.json", "-q", "--method", "apr"];
+        let mut command = fluxion(folder.path());
+        command.args(["render", &scene("cornell-box")]).args(arguments).args(extra).assert().success();
+        let text = std::fs::read_to_string(folder.path().join("a.json")).unwrap();
+        serde_json::from_str::<serde_json::Value>(&text).unwrap()
+    };
+    let stats = render(&["--spp", "20", "--adaptive"]);
+    assert_eq!(stats["samples"], 20 * 1200);
+    assert!(stats["passes"].as_array().unwrap().len() > 1);
+    let image = fluxion::image::io::read(&folder.path().join("a.exr"), &[]).unwrap();
+    let expected = ["B", "G", "R", "error.B", "error.G", "error.R", "samples.Y"];
+    assert!(expected.iter().all(|name| image.channels.iter().any(|channel| channel == name)), "{:?}", image.channels);
+    let at = image.channels.iter().position(|name| name == "samples.Y").unwrap();
+    let counts = image.data.iter().skip(at).step_by(image.channels.len());
+    assert_eq!(counts.sum::<f32>(), 20.0 * 1200.0);
+    assert_eq!(render(&["--spp", "20", "--adaptive", "variance"])["samples"], 20 * 1200);
+    let stats = render(&["--spp", "4000", "--target-error", "0.05"]);
+    assert!(stats["samples"].as_u64().unwrap() < 4000 * 1200);
+    for (extra, expected) in [
+        (&["--adaptive", "nosuch"][..], "predicted_error"),
+        (&["--adaptive", "--method", "l1"], "--adaptive variance"),
+        (&["--target-error", "0"], "positive"),
+        (&["--target-error", "0.1", "--method", "primal"], "estimate its error"),
+    ] {
+        let mut command = fluxion(folder.path());
+        command.args(["render", &scene("cornell-box"), "-o", "b.exr", "--size", "9x7", "--spp", "20"]).args(extra);
+        let (code, text) = stderr(&mut command);
+        assert!(code > 0 && text.contains(expected), "{extra:?}: {code} {text}");
+        assert!(!folder.path().join("b.exr").exists());
+    }
 }

@@ -1,14 +1,14 @@
 //! The classical methods on frames whose truth is known: each does what its literature says.
 
-use fluxion::film::{BINS, Frame, Layer};
+#[path = "common/frames.rs"]
+mod frames;
+
+use fluxion::film::{Frame, Layer};
 use fluxion::image::Image;
 use fluxion::math::{Rgb, rng, vec3};
 use fluxion::metrics;
 use fluxion::reconstruct::{Context, parse, solve};
-
-const WIDTH: usize = 80;
-const HEIGHT: usize = 60;
-const SPP: f32 = 64.0;
+use frames::{COLOR, HEIGHT, Truth, WIDTH, image};
 
 fn truth(x: usize, y: usize) -> Rgb {
     albedo(x, y) * (1.0 + 0.01 * x as f32 - 0.005 * y as f32)
@@ -18,60 +18,8 @@ fn albedo(x: usize, y: usize) -> Rgb {
     if (x / 20 + y / 20).is_multiple_of(2) { vec3(0.8, 0.6, 0.4) } else { vec3(0.2, 0.3, 0.5) }
 }
 
-/// A normal variate from hashes (Box and Muller 1958).
-fn normal(seed: u64, i: usize) -> f32 {
-    let u = |k: u64| rng::unit(rng::combine(rng::combine(seed, k), i as u64));
-    (-2.0 * u(1).max(1e-7).ln()).sqrt() * (std::f32::consts::TAU * u(2)).cos()
-}
-
-fn image(pixel: impl Fn(usize, usize) -> Rgb) -> Image {
-    Image::from_rgb(WIDTH, HEIGHT, pixel)
-}
-
-/// Deviations of a mean of all samples: of colours and of differences.
-const COLOR: f32 = 0.1;
-const EDGE: f32 = 0.02;
-
-/// A frame with all layers and normal noise; the whole is the mean of its bins.
 fn frame(seed: u64) -> Frame {
-    let mut frame = Frame::new(WIDTH, HEIGHT);
-    let bins = BINS as f32;
-    let layers = [
-        (Layer::Color, Layer::ColorVariance, (0, 0), COLOR),
-        (Layer::Dx, Layer::DxVariance, (1, 0), EDGE),
-        (Layer::Dy, Layer::DyVariance, (0, 1), EDGE),
-    ];
-    for (which, (mean, variance, step, deviation)) in layers.into_iter().enumerate() {
-        let bin = [Layer::BinColor, Layer::BinDx, Layer::BinDy][which];
-        let exact = |x: usize, y: usize| match step {
-            (0, 0) => truth(x, y),
-            _ if x + step.0 >= WIDTH || y + step.1 >= HEIGHT => Rgb::ZERO,
-            _ => truth(x + step.0, y + step.1) - truth(x, y),
-        };
-        let mut sum = image(|_, _| Rgb::ZERO);
-        for k in 0..BINS {
-            let seed = rng::combine(seed, (which * BINS + k) as u64);
-            let noise = |x: usize, y: usize| {
-                let at = 3 * (y * WIDTH + x);
-                vec3(normal(seed, at), normal(seed, at + 1), normal(seed, at + 2)) * deviation * bins.sqrt()
-            };
-            let values = image(|x, y| exact(x, y) + noise(x, y));
-            sum.add(&values);
-            frame.set(bin(k as u8), values);
-        }
-        sum.data.iter_mut().for_each(|value| *value /= bins);
-        frame.set(mean, sum);
-        frame.set(variance, image(|_, _| Rgb::splat(deviation * deviation)));
-    }
-    let zero = |channels| Image::new(WIDTH, HEIGHT, channels);
-    frame.set(Layer::Albedo, image(albedo));
-    frame.set(Layer::AlbedoVariance, zero(3));
-    frame.set(Layer::Normal, image(|_, _| vec3(0.0, 1.0, 0.0)));
-    frame.set(Layer::NormalVariance, zero(3));
-    frame.set(Layer::Depth, Image { data: vec![2.0; WIDTH * HEIGHT], ..zero(1) });
-    frame.set(Layer::DepthVariance, zero(1));
-    frame.set(Layer::Samples, Image { data: vec![SPP; WIDTH * HEIGHT], ..zero(1) });
-    frame
+    frames::frame(seed, &Truth { color: truth, albedo })
 }
 
 fn run(method: &str, frame: &Frame) -> Image {
@@ -112,6 +60,12 @@ fn gradients_bring_most_of_the_noise_down() {
         ("rdfc", 0.1),
         ("nfor", 0.08),
         ("frgr", 0.03),
+        ("feature", 0.03),
+        ("feature:variances=draws,screen=0,prefilter=nlm", 0.15),
+        ("apr", 0.03),
+        ("apr:features=generated", 0.05),
+        ("apr:features=normal+albedo+depth", 0.05),
+        ("apr:features=none", 0.5),
     ] {
         let error = mse(&run(method, &frame));
         assert!(error < bound * noise, "{method}: {:.3} of the noise", error / noise);

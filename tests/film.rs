@@ -2,8 +2,8 @@
 
 mod common;
 
-use common::{ALL, bundled, film};
-use fluxion::film::{Layer, exr as layers};
+use common::{ALL, bundled, film, sensor};
+use fluxion::film::{Layer, Needs, exr as layers};
 
 fn on_threads(threads: usize) -> fluxion::film::Film {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
@@ -47,4 +47,41 @@ fn an_independent_reader_finds_the_channels_by_name() {
             assert_eq!(samples, &expected, "{name}");
         }
     }
+}
+
+/// A floor, and a wall at `x` beside the point that the camera looks at.
+fn corner(x: f32) -> fluxion::scene::Scene {
+    let sensor = sensor("3,4,0", 4, 3).replace("\"40\"", "\"0.01\"");
+    common::scene(&format!(
+        r#"{sensor}
+        <emitter type="constant"/>
+        <shape type="rectangle"><transform name="to_world">
+            <rotate x="1" angle="-90"/><scale value="10"/></transform></shape>
+        <shape type="rectangle"><transform name="to_world">
+            <rotate y="1" angle="90"/><scale value="10"/><translate x="{x}"/></transform></shape>"#
+    ))
+}
+
+#[test]
+fn half_of_the_directions_are_open_beside_a_wall_and_all_of_them_in_the_open() {
+    let needs = Needs { features: true, occlusion: true, position: true, ..Needs::default() };
+    for (x, expected) in [(-0.02, 0.5), (-9.0, 1.0)] {
+        let frame = film(&corner(x), 1024, 1, needs).develop();
+        let open = frame.get(Layer::Occlusion).unwrap();
+        let mean = open.data.iter().sum::<f32>() / open.data.len() as f32;
+        assert!((mean - expected).abs() < 0.01, "{mean} instead of {expected}");
+        // The camera looks at the origin, from five units away; rays start a little before it.
+        assert!(frame.get(Layer::Position).unwrap().data.iter().all(|value| value.abs() < 0.01));
+        assert!(frame.get(Layer::Depth).unwrap().data.iter().all(|depth| (depth - 5.0).abs() < 0.02));
+    }
+}
+
+#[test]
+fn what_nobody_needs_is_not_recorded() {
+    let scene = bundled("unit/diffuse", (8, 6));
+    let frame = film(&scene, 4, 1, Needs { features: true, edges: true, bins: true, ..Needs::default() }).develop();
+    for layer in [Layer::Occlusion, Layer::Position, Layer::BinAmbient(0), Layer::BinAmbientDx(3)] {
+        assert!(frame.get(layer).is_none(), "{}", layer.name());
+    }
+    assert!(film(&scene, 4, 1, ALL).develop().present().count() == Layer::COUNT);
 }

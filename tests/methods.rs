@@ -106,7 +106,8 @@ fn exposure_does_not_matter() {
         for scale in [1e-6, 1e6] {
             let mut scaled = run(method, &noisy(23, 14, scale)).unwrap();
             scaled.data.iter_mut().for_each(|value| *value /= scale);
-            assert_close(method, &scaled, &normal, 1e-3);
+            // Rounding may decide whether a column of a regression is new.
+            assert_close(method, &scaled, &normal, 3e-3);
         }
     }
 }
@@ -255,6 +256,13 @@ fn parameters_are_checked() {
         ("frgr:form=nosuch", "paper, code or best"),
         ("frgr:albedo=maybe", "on or off"),
         ("frgr:radius=11", "from 1 to 10"),
+        ("feature:rounds=1", "from 2 to 100"),
+        ("feature:variances=both", "samples or draws"),
+        ("apr:features=normal+colour", "some of normal+albedo"),
+        ("apr:order=2-1", "from 0 to 3"),
+        ("apr:order=4", "from 0 to 3"),
+        ("apr:windows=8", "from 12 to 60"),
+        ("apr:outliers=0", "off or a number"),
         ("l2:beta=1", "it has alpha"),
         ("l2:alpha", "not like name=value"),
         ("l2:alpha=0", "must be a number"),
@@ -263,6 +271,9 @@ fn parameters_are_checked() {
     ] {
         let message = parse(text).err().unwrap_or_else(|| panic!("{text} is taken")).to_string();
         assert!(message.contains(expected), "{text}: {message}");
+    }
+    for text in ["apr:features=none", "apr:order=1", "apr:windows=20+44,outliers=off", "feature:prefilter=nlm"] {
+        assert!(parse(text).is_ok(), "{text}");
     }
     for text in ["l2:alpha=0.5", "control_variate:cross=on,iterations=3", "least_trimmed:norm=l2", "nlm:features=off"] {
         assert!(parse(text).is_ok(), "{text}");

@@ -9,10 +9,13 @@ use crate::reconstruct::Solution;
 const EPSILON: f64 = 0.01;
 
 /// How certain it is beforehand that estimates are right: as if so much had been seen.
-const PRIOR: f64 = 10.0;
+const PRIOR: f64 = 0.5;
 
 /// Squares of noise are not normally distributed: they tell less than they would.
 const TAILS: f64 = 0.1;
+
+/// Squared distances count at most so many times what they are expected to be: single ones would decide.
+const MOST: f64 = 9.0;
 
 /// What has been seen in all passes so far. Sums over pixels, errors relative to the image's brightness.
 #[derive(Clone, Copy, Debug, Default)]
@@ -76,12 +79,9 @@ const DIRECT: [Layer; 2] = [Layer::Direct, Layer::DirectVariance];
 impl Estimate {
     /// Compares an image with the samples that were added since.
     pub fn learn(&mut self, before: &Frame, solution: &Solution, after: &Frame) {
-        let (Some(error), Some(n), Some(all), Some(noise)) = (
-            &solution.error,
-            before.get(Layer::Samples),
-            after.get(Layer::Samples),
-            smooth_variance(before),
-        ) else {
+        let (Some(error), Some(n), Some(all), Some(noise)) =
+            (&solution.error, before.get(Layer::Samples), after.get(Layer::Samples), smooth_variance(before))
+        else {
             return;
         };
         let expected = |at: usize, color: &Moments, direct: &Moments| {
@@ -95,7 +95,9 @@ impl Estimate {
         let typical = (0..values).map(known).sum::<f64>() / values as f64;
         for at in 0..values {
             let (n, all) = (f64::from(n.data[at / 3]), f64::from(all.data[at / 3]));
-            let (Some([color, direct]), Some([color_after, direct_after])) = (of(at, before), of(at, after)) else { return };
+            let (Some([color, direct]), Some([color_after, direct_after])) = (of(at, before), of(at, after)) else {
+                return;
+            };
             if all - n < 2.0 || n < 2.0 {
                 continue;
             }
@@ -106,7 +108,7 @@ impl Estimate {
             let new = color_after.since(&color, n, all);
             let distance = f64::from(solution.image.data[at]) - direct.mean - new.mean;
             self.expected += weight * expected * expected;
-            self.found += weight * expected * relative * distance.powi(2);
+            self.found += weight * expected * (relative * distance.powi(2)).min(MOST * spread);
             self.claimed += weight * expected * relative * new.variance;
             let apart = |new: &Moments, old: &Moments| ((new.mean - old.mean).powi(2), new.variance + old.variance);
             let (found, claimed) = apart(&new, &color);
@@ -126,7 +128,6 @@ impl Estimate {
     pub fn rel_mse(&self, frame: &Frame, solution: &Solution) -> f64 {
         let Some(error) = &solution.error else { return f64::INFINITY };
         let (of_scattered, of_direct) = (self.ratio(), self.spread[1].value());
-        if std::env::var("DBG").is_ok() { eprintln!("ratio {of_scattered} prior {PRIOR} expected {} direct {of_direct} spread {}", self.expected, self.spread[0].value()); }
         let variance = frame.get(Layer::DirectVariance);
         let relative = |at: usize| {
             let direct = variance.map_or(0.0, |variance| f64::from(variance.data[at]));

@@ -39,8 +39,7 @@ pub trait Allocator: Sync {
 }
 
 /// Every allocator, the default first.
-pub const ALLOCATORS: &[&dyn Allocator] =
-    &[&predicted_error::PredictedError, &variance::Variance, &uniform::Uniform];
+pub const ALLOCATORS: &[&dyn Allocator] = &[&predicted_error::PredictedError, &variance::Variance, &uniform::Uniform];
 
 /// The allocator of a name.
 pub fn allocator(id: &str) -> Result<&'static dyn Allocator> {

@@ -127,7 +127,7 @@ fn methods(list: Option<&str>) -> Result<Vec<String>> {
         Some(list) => {
             for part in list.split(',').map(str::trim) {
                 match methods.last_mut() {
-                    Some(last) if part.contains('=') && !part.contains(':') => *last += &format!(",{part}"),
+                    Some(last) if is_parameter(part) => *last += &format!(",{part}"),
                     _ => methods.push(part.to_owned()),
                 }
             }
@@ -144,6 +144,11 @@ fn methods(list: Option<&str>) -> Result<Vec<String>> {
         }
     }
     Ok(methods)
+}
+
+/// Whether a part of a list is `name=value` and not a method such as `l1+adaptive=variance`.
+fn is_parameter(part: &str) -> bool {
+    part.split_once('=').is_some_and(|(name, _)| !name.contains([':', '+']))
 }
 
 /// Scene files, those in folders sorted by name.

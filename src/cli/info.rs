@@ -4,11 +4,12 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::{Result, bail};
+use fluxion::adaptive::ALLOCATORS;
 use fluxion::error::Error;
 use fluxion::film::{Layer, Needs};
 use fluxion::metrics::METRICS;
 use fluxion::plan::Plan;
-use fluxion::reconstruct::{self, METHODS};
+use fluxion::reconstruct::{self, METHODS, Method};
 use fluxion::scene::load::integrator;
 use fluxion::scene::shape::Geometry;
 use fluxion::scene::{Scene, bsdf, emitter, load, sensor, shape, texture};
@@ -72,12 +73,16 @@ fn methods() {
             println!("    {}={}  {}", parameter.name, parameter.default, parameter.summary);
         }
     }
+    let estimates = |method: &&Method| reconstruct::parse(method.id).is_ok_and(|made| made.estimates_error());
+    let names: Vec<_> = METHODS.iter().filter(estimates).map(|method| method.id).collect();
+    println!("\nof which {} estimate their error, for --adaptive and --target-error", names.join(", "));
+    println!("\nallocators of --adaptive:");
+    ALLOCATORS.iter().for_each(|allocator| println!("    {}  {}", allocator.id(), allocator.summary()));
 }
 
 fn layers() {
     println!("| channels | unit | range | recorded with | what |\n|---|---|---|---|---|");
-    let binned = |layer: &Layer| matches!(layer, Layer::BinColor(k) | Layer::BinDx(k) | Layer::BinDy(k) if *k > 0);
-    for layer in Layer::all().filter(|layer| !binned(layer)) {
+    for layer in Layer::all().filter(|layer| layer.bin_number().unwrap_or(0) == 0) {
         let info = layer.info();
         let names = layer.channel_names().iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(" ");
         println!("| {names} | {} | {} | {} | {} |", info.unit, info.range, info.flag, info.summary);

@@ -236,6 +236,11 @@ impl Layer {
         }
     }
 
+    /// Number of the bin, of layers that every bin has.
+    pub fn bin_number(self) -> Option<u8> {
+        self.bin().map(|(_, number)| number)
+    }
+
     /// Row of [`BINNED`] and number of the bin.
     fn bin(self) -> Option<(usize, u8)> {
         match self {

@@ -49,7 +49,10 @@ pub fn write_color(
     } else {
         let all = || std::iter::once(image).chain(layers.iter().map(|(_, layer)| *layer));
         let pixels = 0..image.width * image.height;
-        pixels.flat_map(|i| all().flat_map(move |image| &image.data[i * image.channels..][..image.channels])).copied().collect()
+        pixels
+            .flat_map(|i| all().flat_map(move |image| &image.data[i * image.channels..][..image.channels]))
+            .copied()
+            .collect()
     };
     let (width, height, attributes) = (image.width, image.height, attributes.to_vec());
     let pixels = Pixels { width, height, channels, data, eight_bit: encoded, attributes };

@@ -113,13 +113,15 @@ const FLOOR: f32 = 1e-4;
 /// Least screening, which keeps the mean where it is.
 const PIN: f32 = 1e-5;
 
-/// Residuals of the first problem are brought down to this share, and those of the rounds, which start at its solution
-/// and tell variances only.
+/// Residuals of the first problem are brought down to this share.
 const TOLERANCE: f64 = 1e-3;
+
+/// Those of the rounds, which start at its solution and tell variances only: a step or two, which find about 0.6 of the
+/// variance. What it is multiplied by below accounts for that.
 const ROUGHLY: f64 = 0.5;
 
-/// Filters trust variances of solutions too much: their errors are alike at neighbouring pixels, whose distances are
-/// averaged as if they were not.
+/// Filters trust variances of solutions too much: errors of neighbouring pixels are alike, whose distances they average as
+/// if they were not.
 const CORRELATION: f32 = 3.0;
 
 /// Share of the feature's variance that cleaning leaves, as measured.
@@ -243,6 +245,7 @@ struct Groups<'a> {
 
 impl<'a> Groups<'a> {
     fn of(inputs: &Inputs<'a>, ambient: f32) -> Result<Self> {
+        inputs.frame.require(Layer::Dx)?;
         let images = |layer: fn(u8) -> Layer| {
             let image = |k| Ok(inputs.frame.require(layer(k))?.data.as_slice());
             (0..BINS as u8).map(image).collect::<Result<Vec<_>>>()

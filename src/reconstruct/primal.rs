@@ -19,6 +19,10 @@ impl Reconstruction for Primal {
         Needs::default()
     }
 
+    fn estimates_error(&self) -> bool {
+        true
+    }
+
     fn reconstruct(&self, frame: &Frame, _context: &Context) -> Result<Solution> {
         let image = frame.require(Layer::Color)?.clone();
         Ok(Solution { image, error: frame.get(Layer::ColorVariance).cloned(), notes: Vec::new() })

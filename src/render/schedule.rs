@@ -144,7 +144,8 @@ fn run_tile(scene: &Scene, settings: Settings, tile: &mut Tile, wave: Wave) -> O
     let mut tracer = edges.then(|| Tracer::new(settings.shift, ambient));
     let mut first_rejected = None;
     let at = |pixel: usize, tile: &Tile| (tile.x + pixel % tile.width, tile.y + pixel / tile.width);
-    let counts: Vec<u32> = (0..tile.width * tile.height).map(|pixel| at(pixel, tile)).map(|(x, y)| wave(x, y)).collect();
+    let counts: Vec<u32> =
+        (0..tile.width * tile.height).map(|pixel| at(pixel, tile)).map(|(x, y)| wave(x, y)).collect();
     for turn in 0..counts.iter().copied().max().unwrap_or(0) {
         for pixel in (0..counts.len()).filter(|&pixel| turn < counts[pixel]) {
             let (x, y) = at(pixel, tile);

@@ -292,7 +292,7 @@ mod tests {
     #[test]
     fn solutions_are_found_whatever_the_weights_and_the_size() {
         for (width, height) in [(1, 1), (1, 40), (30, 1), (17, 23), (150, 90)] {
-            for decades in [0.0, 4.0, 8.0] {
+            for decades in [0.0, 4.0, 8.0, 12.0] {
                 let graph = grid(width, height, decades, 1e-3);
                 let exact = noise(width * height, 5);
                 let b = apply(&graph, &exact);
@@ -301,7 +301,8 @@ mod tests {
                 let solved = solver.solve(&b, vec![[0.0; 4]; width * height], 1e-5);
                 let left = norm(&residual(solver.graph(0), &b, &solved.x));
                 assert!(left < 1e-3 * size, "{width}x{height}, {decades} decades: {left} of {size}");
-                assert!(solved.steps <= 30, "{width}x{height}, {decades} decades: {} steps", solved.steps);
+                let most = if decades > 8.0 { 60 } else { 30 };
+                assert!(solved.steps <= most, "{width}x{height}, {decades} decades: {} steps", solved.steps);
             }
         }
     }

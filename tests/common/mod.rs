@@ -44,7 +44,8 @@ pub fn sensor(origin: &str, width: usize, height: usize) -> String {
 }
 
 /// Everything a film can record.
-pub const ALL: Needs = Needs { features: true, edges: true, bins: true };
+pub const ALL: Needs =
+    Needs { features: true, edges: true, bins: true, occlusion: true, position: true, ambient: true };
 
 /// Renders some samples of every pixel.
 pub fn film(scene: &Scene, spp: u32, seed: u64, needs: Needs) -> Film {

@@ -89,7 +89,8 @@ struct Apr {
 fn make(parameters: &Parameters) -> Result<Box<dyn Reconstruction>> {
     let known = |name: &str| name == "generated" || LAYERS.iter().any(|(layer, ..)| *layer == name);
     let all = |text: &String| text == "none" || text.split('+').all(known);
-    let features: String = parameters.get("features", "none, or some of normal+albedo+depth+occlusion+position+generated", all)?;
+    let features: String =
+        parameters.get("features", "none, or some of normal+albedo+depth+occlusion+position+generated", all)?;
     let named = |name: &str| features.split('+').any(|feature| feature == name);
     let layers: Vec<usize> = (0..LAYERS.len()).filter(|&k| named(LAYERS[k].0)).collect();
     let options = Options::new(parameters)?;
@@ -100,10 +101,12 @@ fn make(parameters: &Parameters) -> Result<Box<dyn Reconstruction>> {
         let orders = (low.parse::<usize>().ok()?, high.parse::<usize>().ok()?);
         Some(orders).filter(|(low, high)| low <= high && *high <= ORDER)
     };
-    let order: String = parameters.get("order", "an order or a range of orders from 0 to 3", |text| orders(text).is_some())?;
+    let order: String =
+        parameters.get("order", "an order or a range of orders from 0 to 3", |text| orders(text).is_some())?;
     let side = |text: &str| text.parse::<usize>().ok().filter(|side| (12..=60).contains(side));
     let sides = |text: &String| text.split('+').map(side).collect::<Option<Vec<_>>>();
-    let windows: String = parameters.get("windows", "sides from 12 to 60 with + between", |text| sides(text).is_some())?;
+    let windows: String =
+        parameters.get("windows", "sides from 12 to 60 with + between", |text| sides(text).is_some())?;
     let limit = |text: &String| text.parse::<f32>().ok().filter(|limit| (1.0..=1e6).contains(limit));
     let outliers: String =
         parameters.get("outliers", "off or a number in [1, 1e6]", |text| text == "off" || limit(text).is_some())?;
@@ -175,6 +178,10 @@ impl Apr {
     /// All features, cleaned, if there are any.
     fn features(&self, inputs: &Inputs, progress: &dyn Fn(f32)) -> Result<Features> {
         let mut features = Features::default();
+        if self.generated.is_some() {
+            // What a flag of its own renders is asked for first.
+            inputs.frame.require(Layer::Dx)?;
+        }
         let mut add = |planes: Planes| {
             features.planes = Some(features.planes.take().map_or_else(|| planes.clone(), |all| all.and(&planes)));
         };

@@ -87,10 +87,15 @@ impl Problem<'_> {
     /// Sums of weighted products of a block's columns, and of columns with colours.
     fn add_block(&self, block: (usize, usize), middle: (f32, f32), sums: &mut [f64]) {
         let of = |blocks: &Blocks| blocks.at(block.0, block.1).to_vec();
-        products(&design(&of(self.features), block, middle), columns(self.features.channels, ORDER), Pixels {
-            color: [0, 1, 2].map(|c| self.color.at(block.0, block.1)[c]),
-            weight: self.weight.at(block.0, block.1)[0],
-        }, sums);
+        products(
+            &design(&of(self.features), block, middle),
+            columns(self.features.channels, ORDER),
+            Pixels {
+                color: [0, 1, 2].map(|c| self.color.at(block.0, block.1)[c]),
+                weight: self.weight.at(block.0, block.1)[0],
+            },
+            sums,
+        );
     }
 }
 
