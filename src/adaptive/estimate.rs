@@ -9,13 +9,10 @@ use crate::reconstruct::Solution;
 const EPSILON: f64 = 0.01;
 
 /// How certain it is beforehand that estimates are right: as if so much had been seen.
-const PRIOR: f64 = 0.5;
+const PRIOR: f64 = 2.0;
 
 /// Squares of noise are not normally distributed: they tell less than they would.
 const TAILS: f64 = 0.1;
-
-/// Squared distances count at most so many times what they are expected to be: single ones would decide.
-const MOST: f64 = 9.0;
 
 /// What has been seen in all passes so far. Sums over pixels, errors relative to the image's brightness.
 #[derive(Clone, Copy, Debug, Default)]
@@ -93,7 +90,7 @@ impl Estimate {
         let known = |at| of(at, before).map_or(0.0, |[color, direct]| expected(at, &color, &direct).1);
         // Where noise is small beside the typical error, all pixels count alike.
         let typical = (0..values).map(known).sum::<f64>() / values as f64;
-        for at in 0..values {
+        for (at, &noise) in noise.iter().enumerate() {
             let (n, all) = (f64::from(n.data[at / 3]), f64::from(all.data[at / 3]));
             let (Some([color, direct]), Some([color_after, direct_after])) = (of(at, before), of(at, after)) else {
                 return;
@@ -103,12 +100,12 @@ impl Estimate {
             }
             let (relative, expected) = expected(at, &color, &direct);
             // Pixels count by how well they tell: one over the variance of what is found.
-            let spread = relative * f64::from(noise[at]) * n / (all - n) + expected + typical;
+            let spread = relative * f64::from(noise) * n / (all - n) + expected + typical;
             let weight = TAILS / (2.0 * spread * spread).max(1e-30);
             let new = color_after.since(&color, n, all);
             let distance = f64::from(solution.image.data[at]) - direct.mean - new.mean;
             self.expected += weight * expected * expected;
-            self.found += weight * expected * (relative * distance.powi(2)).min(MOST * spread);
+            self.found += weight * expected * relative * distance.powi(2);
             self.claimed += weight * expected * relative * new.variance;
             let apart = |new: &Moments, old: &Moments| ((new.mean - old.mean).powi(2), new.variance + old.variance);
             let (found, claimed) = apart(&new, &color);

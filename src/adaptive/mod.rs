@@ -126,7 +126,7 @@ const OVERHEAD: f64 = 0.1;
 const GROWTH: (f64, f64) = (0.15, 1.0);
 
 /// The least that the first of these passes adds.
-const CONFIRM: f64 = 0.5;
+const CONFIRM: f64 = 1.0;
 
 /// How errors fall with samples, when guessing how many will do.
 const SLOPE: f64 = 0.85;
@@ -238,8 +238,10 @@ impl Run<'_> {
         // One sample tells the speed.
         self.add(1);
         let all = self.affordable() / self.pixels() + 1.0;
-        let share = if error.is_some() { 0.0 } else { FIRST_SHARE * all };
-        let first = f64::from(FIRST).max(share);
+        let first = match error {
+            Some(_) => f64::from(2 * FIRST),
+            None => f64::from(FIRST).max(FIRST_SHARE * all),
+        };
         let too_slow = |time: Duration| self.goes_by_error && self.finish() > 2.0 * OVERHEAD * time.as_secs_f64();
         let decides = error.is_some() || self.settings.allocator.id() != uniform::Uniform.id();
         if decides && all > 1.5 * first && !time.is_some_and(too_slow) {

@@ -233,11 +233,18 @@ fn draw(round: u32, which: u64) -> Draw {
     draw
 }
 
+/// Images of all groups.
+struct Layers<'a> {
+    images: Vec<&'a [f32]>,
+    /// Those of the ambient light, if it is on.
+    lit: Vec<&'a [f32]>,
+    /// To the pixel that samples are taken of, too.
+    step: usize,
+}
+
 /// The samples of colour and differences in groups.
 struct Groups<'a> {
-    /// For each of the three, the groups' images, those of the ambient light if it is on, and the step to the pixel that it
-    /// also takes samples of.
-    layers: [(Vec<&'a [f32]>, Vec<&'a [f32]>, usize); 3],
+    layers: [Layers<'a>; 3],
     counts: &'a [f32],
     scale: f32,
     ambient: f32,
@@ -253,9 +260,9 @@ impl<'a> Groups<'a> {
         let lit = |layer| if ambient > 0.0 { images(layer) } else { Ok(Vec::new()) };
         Ok(Self {
             layers: [
-                (images(Layer::BinColor)?, lit(Layer::BinAmbient)?, 0),
-                (images(Layer::BinDx)?, lit(Layer::BinAmbientDx)?, 1),
-                (images(Layer::BinDy)?, lit(Layer::BinAmbientDy)?, inputs.frame.width),
+                Layers { images: images(Layer::BinColor)?, lit: lit(Layer::BinAmbient)?, step: 0 },
+                Layers { images: images(Layer::BinDx)?, lit: lit(Layer::BinAmbientDx)?, step: 1 },
+                Layers { images: images(Layer::BinDy)?, lit: lit(Layer::BinAmbientDy)?, step: inputs.frame.width },
             ],
             counts: &inputs.frame.require(Layer::Samples)?.data,
             scale: inputs.scale,
@@ -273,7 +280,7 @@ impl<'a> Groups<'a> {
     }
 
     fn pixel(&self, which: usize, draw: &Draw, i: usize) -> (Quad, f32) {
-        let (images, lit, step) = &self.layers[which];
+        let Layers { images, lit, step } = &self.layers[which];
         let Some(&far) = self.counts.get(i + step) else { return ([0.0; 4], 0.0) };
         let samples = self.counts[i].min(far) as u32;
         let counts: Draw = std::array::from_fn(|k| bin_count(samples, k));

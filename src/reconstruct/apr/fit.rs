@@ -93,17 +93,16 @@ fn orthogonalise(matrix: &Matrix, right: &[[f64; 3]; COLUMNS], features: usize) 
             continue;
         }
         l[i][i] = (rest + ridge).sqrt();
-        inverse[i][i] = 1.0 / l[i][i];
-        for j in 0..i {
+        let mut row = [0.0; COLUMNS];
+        row[i] = 1.0 / l[i][i];
+        for (j, slot) in row[..i].iter_mut().enumerate() {
             let known: f64 = (j..i).map(|k| l[i][k] * inverse[k][j]).sum();
-            inverse[i][j] = -known / l[i][i];
+            *slot = -known / l[i][i];
         }
-        for j in 0..=i {
-            fit.inverse[entry(i, j)] = inverse[i][j] as f32;
-        }
-        for c in 0..3 {
-            fit.slopes[i][c] = (0..=i).map(|j| inverse[i][j] * right[j][c]).sum::<f64>() as f32;
-        }
+        let slots = &mut fit.inverse[entry(i, 0)..=entry(i, i)];
+        slots.iter_mut().zip(&row).for_each(|(slot, &value)| *slot = value as f32);
+        fit.slopes[i] = [0, 1, 2].map(|c| row[..=i].iter().zip(right).map(|(a, b)| a * b[c]).sum::<f64>() as f32);
+        inverse[i] = row;
     }
     fit
 }
