@@ -156,7 +156,7 @@ pub fn error(variance: &Planes, own: &Planes) -> Planes {
 fn bagged(inputs: &Inputs, options: &Options, progress: &dyn Fn(f32)) -> Result<Guide> {
     let (width, height) = (inputs.frame.width, inputs.frame.height);
     let groups = Groups::of(inputs, options.ambient)?;
-    let (all, of_draw) = groups.draw(&[[1; BINS]; 3]);
+    let (all, of_draw) = groups.draw(&[[1; BINS]; 3], true);
     // The ambient light's variances are only known from groups.
     let by_samples = options.variances == Variances::Samples && options.ambient == 0.0;
     let variances = if by_samples { of_samples(inputs)? } else { of_draw };
@@ -169,8 +169,9 @@ fn bagged(inputs: &Inputs, options: &Options, progress: &dyn Fn(f32)) -> Result<
     let whole = solver.solve(&right, color, TOLERANCE).x;
     let mut sums: Vec<Quad> = vec![[0.0; 4]; whole.len()];
     for round in 0..options.rounds {
-        let ([color, dx, dy], variances) = groups.draw(&[0, 1, 2].map(|which| draw(round, which)));
-        if options.variances == Variances::Draws {
+        let reweighs = options.variances == Variances::Draws;
+        let ([color, dx, dy], variances) = groups.draw(&[0, 1, 2].map(|which| draw(round, which)), reweighs);
+        if reweighs {
             weights = self::weights(&variances, options.screen);
             solver.replace(weights.graph(width));
         }
@@ -270,16 +271,16 @@ impl<'a> Groups<'a> {
         })
     }
 
-    /// Means of the drawn groups, and their variances, sums over the channels.
-    fn draw(&self, draws: &[Draw; 3]) -> ([Vec<Quad>; 3], [Vec<f32>; 3]) {
+    /// Means of the drawn groups, and their variances, sums over the channels, if they are `wanted`.
+    fn draw(&self, draws: &[Draw; 3], wanted: bool) -> ([Vec<Quad>; 3], [Vec<f32>; 3]) {
         let of = |which: usize| -> (Vec<Quad>, Vec<f32>) {
-            (0..self.counts.len()).into_par_iter().map(|i| self.pixel(which, &draws[which], i)).unzip()
+            (0..self.counts.len()).into_par_iter().map(|i| self.pixel(which, &draws[which], i, wanted)).unzip()
         };
         let [(color, of_color), (dx, of_dx), (dy, of_dy)] = [of(0), of(1), of(2)];
         ([color, dx, dy], [of_color, of_dx, of_dy])
     }
 
-    fn pixel(&self, which: usize, draw: &Draw, i: usize) -> (Quad, f32) {
+    fn pixel(&self, which: usize, draw: &Draw, i: usize, wanted: bool) -> (Quad, f32) {
         let Layers { images, lit, step } = &self.layers[which];
         let Some(&far) = self.counts.get(i + step) else { return ([0.0; 4], 0.0) };
         let samples = self.counts[i].min(far) as u32;
@@ -296,6 +297,9 @@ impl<'a> Groups<'a> {
                 *value += image[3 * i + c] * self.ambient;
             }
             mean[c] = share * (0..BINS).map(|k| weights[k] * values[k]).sum::<f32>();
+            if !wanted {
+                continue;
+            }
             squares += (0..BINS).map(|k| weights[k] * (values[k] - mean[c]).powi(2)).sum::<f32>();
         }
         let groups: u32 = drawn.iter().sum();
