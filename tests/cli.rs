@@ -228,7 +228,7 @@ fn adaptive_renders_hold_their_counts_and_errors() {
         (&["--adaptive", "nosuch"][..], "predicted_error"),
         (&["--adaptive", "--method", "l1"], "--adaptive variance"),
         (&["--target-error", "0"], "positive"),
-        (&["--target-error", "0.1", "--method", "primal"], "estimate its error"),
+        (&["--target-error", "0.1", "--method", "nlm"], "estimate its error"),
     ] {
         let mut command = fluxion(folder.path());
         command.args(["render", &scene("cornell-box"), "-o", "b.exr", "--size", "9x7", "--spp", "20"]).args(extra);
