@@ -106,8 +106,9 @@ fn exposure_does_not_matter() {
         for scale in [1e-6, 1e6] {
             let mut scaled = run(method, &noisy(23, 14, scale)).unwrap();
             scaled.data.iter_mut().for_each(|value| *value /= scale);
-            // Rounding may decide whether a column of a regression is new.
-            assert_close(method, &scaled, &normal, 3e-3);
+            // In `apr` rounding may decide whether a monomial is new in a window.
+            let tolerance = if method.id == "apr" { 1e-2 } else { 1e-3 };
+            assert_close(method, &scaled, &normal, tolerance);
         }
     }
 }
