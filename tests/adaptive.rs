@@ -4,7 +4,7 @@ mod common;
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use common::{bundled, film};
+use common::{bundled, check_zero, film};
 use fluxion::adaptive::{self, ALLOCATORS, Allocator, Limits, Settings};
 use fluxion::error::Result;
 use fluxion::film::{Frame, Layer, Needs};
@@ -152,27 +152,6 @@ fn unequal(scene: &Scene, seed: u64, needs: Needs) -> Frame {
     render::add(scene, samples(needs, seed), &control, &mut outcome, &rest);
     assert_eq!(outcome.film.counts(), counts);
     outcome.film.develop()
-}
-
-/// Over all values, means over runs of what must be zero in the mean look like it: centred and spread as Student's t.
-fn check_zero(name: &str, runs: &[Vec<f64>]) {
-    let n = runs.len() as f64;
-    let (mut sum, mut squares, mut beyond, mut count) = (0.0, 0.0, 0, 0.0);
-    for at in 0..runs[0].len() {
-        let mean = runs.iter().map(|run| run[at]).sum::<f64>() / n;
-        let variance = runs.iter().map(|run| (run[at] - mean).powi(2)).sum::<f64>() / (n - 1.0) / n;
-        if variance == 0.0 {
-            assert_eq!(mean, 0.0, "{name}: a value without variance");
-            continue;
-        }
-        let t = mean / variance.sqrt();
-        (sum, squares, count) = (sum + t, squares + t * t, count + 1.0);
-        beyond += usize::from(t.abs() > 4.0);
-    }
-    assert!(count > 500.0 && (sum / count).abs() < 5.0 / f64::sqrt(count), "{name}: mean t {}", sum / count);
-    let spread = (squares / count).sqrt();
-    assert!(spread > 0.8 && spread < 1.2, "{name}: spread {spread} instead of 1.07");
-    assert!(beyond as f64 <= 0.01 * count, "{name}: {beyond} of {count} beyond four");
 }
 
 /// A layer minus the differences along `step` of a layer of another frame; with no step, minus the layer.

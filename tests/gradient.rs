@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{ALL, bundled, film, shifted_film};
+use common::{ALL, bundled, check_zero, film, shifted_film};
 use fluxion::film::{Layer, Needs};
 use fluxion::image::Image;
 use fluxion::math::{Vec3, rng, vec2, vec3};
@@ -27,24 +27,9 @@ fn check_unbiased(name: &str, spp: u32, shift: Shift) {
                 errors(gradient.get(layer).unwrap(), image.get(Layer::Color).unwrap(), step)
             })
             .collect();
-        let n = RUNS as f64;
-        let (mut sum, mut squares, mut beyond, mut count) = (0.0, 0.0, 0, 0.0);
-        for edge in 0..runs[0].len() {
-            let mean = runs.iter().map(|run| run[edge]).sum::<f64>() / n;
-            let variance = runs.iter().map(|run| (run[edge] - mean).powi(2)).sum::<f64>() / (n - 1.0) / n;
-            if variance == 0.0 {
-                assert_eq!(mean, 0.0, "{name}: a difference without variance");
-                continue;
-            }
-            let t = mean / variance.sqrt();
-            (sum, squares, count) = (sum + t, squares + t * t, count + 1.0);
-            beyond += usize::from(t.abs() > 4.0);
-        }
         // Every colour is in up to four edges, in both directions, so their sum is known better than n says.
-        assert!((sum / count).abs() < 5.0 / f64::sqrt(count), "{name}: mean t {}", sum / count);
-        let spread = (squares / count).sqrt();
-        assert!(spread > 0.8 && spread < 1.2, "{name}: spread {spread} instead of 1.07");
-        assert!(beyond as f64 <= 0.01 * count, "{name}: {beyond} of {count} beyond four");
+        check_zero(name, &runs);
+        let n = RUNS as f64;
         // The sum over all edges of a run, whose mean is known best.
         let totals: Vec<f64> = runs.iter().map(|run| run.iter().sum()).collect();
         let mean = totals.iter().sum::<f64>() / n;

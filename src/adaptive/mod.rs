@@ -12,10 +12,10 @@ mod variance;
 
 use std::time::{Duration, Instant};
 
-pub use self::allocate::allocate;
-use self::estimate::Estimate;
 use serde::Serialize;
 
+use self::allocate::allocate;
+use self::estimate::Estimate;
 use crate::error::{Error, Result};
 use crate::film::Frame;
 use crate::reconstruct::{self, Context, Reconstruction, Solution};
@@ -154,7 +154,7 @@ pub fn run(scene: &Scene, settings: &Settings, control: &Control, context: &Cont
 struct Times {
     develop: f64,
     reconstruct: f64,
-    /// Of developing and reconstructing, the last time.
+    /// Of the last reconstruction.
     last: Option<f64>,
 }
 

@@ -56,6 +56,19 @@ pub struct Pilot {
     pub finish: f64,
 }
 
+/// What a run is told.
+#[derive(Clone, Copy)]
+struct Terms<'a> {
+    budget: Budget,
+    seed: u64,
+    /// Seconds that the reconstruction is going to take.
+    finish: f64,
+    stop: &'a AtomicBool,
+}
+
+/// Reconstructions that report to nobody.
+const QUIET: Context = Context { progress: &|_, _| {}, memory: None, notes: false };
+
 /// A method on a scene.
 pub struct Runner<'a> {
     /// The scene.
@@ -116,8 +129,7 @@ impl<'a> Runner<'a> {
 
     fn finish(&self, frame: &Frame, seconds: &mut Seconds) -> Result<Image> {
         let start = Instant::now();
-        let context = Context { progress: &|_, _| {}, memory: None, notes: false };
-        let image = reconstruct::solve(self.made.as_ref(), frame, &context)?.image;
+        let image = reconstruct::solve(self.made.as_ref(), frame, &QUIET)?.image;
         seconds.reconstruct = start.elapsed().as_secs_f64();
         Ok(image)
     }
@@ -136,19 +148,12 @@ impl<'a> Runner<'a> {
     }
 
     /// As many samples for every pixel. None if it was stopped.
-    fn straight(
-        &self,
-        budget: Budget,
-        seed: u64,
-        pilot: Pilot,
-        stop: &AtomicBool,
-        seconds: &mut Seconds,
-    ) -> Result<Option<(render::Outcome, Image)>> {
-        let allowed = match budget {
+    fn straight(&self, terms: Terms, seconds: &mut Seconds) -> Result<Option<(render::Outcome, Image)>> {
+        let allowed = match terms.budget {
             Budget::Spp(spp) => render::Budget::Spp(spp),
-            Budget::Seconds(total) => render::Budget::Time(Duration::from_secs_f64((total - pilot.finish).max(1e-6))),
+            Budget::Seconds(total) => render::Budget::Time(Duration::from_secs_f64((total - terms.finish).max(1e-6))),
         };
-        let (outcome, frame) = self.frame(allowed, seed, stop, seconds);
+        let (outcome, frame) = self.frame(allowed, terms.seed, terms.stop, seconds);
         if outcome.stopped {
             return Ok(None);
         }
@@ -160,27 +165,23 @@ impl<'a> Runner<'a> {
     fn adapt(
         &self,
         allocator: &dyn Allocator,
-        budget: Budget,
-        seed: u64,
-        pilot: Pilot,
-        stop: &AtomicBool,
+        terms: Terms,
         seconds: &mut Seconds,
     ) -> Result<Option<(render::Outcome, Image)>> {
-        let limits = match budget {
+        let limits = match terms.budget {
             Budget::Spp(spp) => Limits { spp: Some(spp), ..Limits::default() },
             Budget::Seconds(total) => Limits { time: Some(Duration::from_secs_f64(total)), ..Limits::default() },
         };
         let settings = adaptive::Settings {
-            render: self.settings(render::Budget::Spp(1), seed),
+            render: self.settings(render::Budget::Spp(1), terms.seed),
             method: self.made.as_ref(),
             allocator,
             limits,
-            reconstruction: Some(Duration::from_secs_f64(pilot.finish)),
+            reconstruction: Some(Duration::from_secs_f64(terms.finish)),
             lit: self.lit,
         };
-        let context = Context { progress: &|_, _| {}, memory: None, notes: false };
-        let control = Control { stop, progress: &|_| {} };
-        let outcome = adaptive::run(&self.case.scene, &settings, &control, &context)?;
+        let control = Control { stop: terms.stop, progress: &|_| {} };
+        let outcome = adaptive::run(&self.case.scene, &settings, &control, &QUIET)?;
         let adaptive::Outcome { render, solution, develop, reconstruct, .. } = outcome;
         (seconds.render, seconds.develop, seconds.reconstruct) = (render.elapsed.as_secs_f64(), develop, reconstruct);
         Ok((!render.stopped).then_some((render, solution.image)))
@@ -193,10 +194,10 @@ impl<'a> Runner<'a> {
         let mut seconds = Seconds { load: self.case.load, ..Seconds::default() };
         // Runs of different budgets do not share samples; those of different methods do.
         let salt = budget.to_string().bytes().fold(0, |hash, byte| rng::combine(hash, u64::from(byte)));
-        let seed_of_run = rng::combine(seed, salt);
+        let terms = Terms { budget, seed: rng::combine(seed, salt), finish: pilot.finish, stop };
         let made = match self.allocator {
-            Some(allocator) => self.adapt(allocator, budget, seed_of_run, pilot, stop, &mut seconds)?,
-            None => self.straight(budget, seed_of_run, pilot, stop, &mut seconds)?,
+            Some(allocator) => self.adapt(allocator, terms, &mut seconds)?,
+            None => self.straight(terms, &mut seconds)?,
         };
         let Some((outcome, image)) = made else { return Ok(None) };
         seconds.total = seconds.render + seconds.develop + seconds.reconstruct;

@@ -43,10 +43,9 @@ impl Reconstruction for Feature {
         let [feature, variance] = generated::feature(&inputs, &self.options, &report)?;
         let (width, height) = (frame.width, frame.height);
         let error = generated::error(&variance, &Planes::new(width, height, 1));
-        let of_value = Planes::from_fn(width, height, 3, |_, x, y| error.at(0, x as isize, y as isize) / 3.0);
         Ok(Solution {
             image: feature.to_image(width, height, 1.0 / inputs.scale),
-            error: Some(of_value.to_image(width, height, 1.0 / (inputs.scale * inputs.scale))),
+            error: Some(inputs.error(&error.map(|error| error / 3.0))),
             notes: Vec::new(),
         })
     }

@@ -92,6 +92,13 @@ impl<'a> Inputs<'a> {
         Image { data: data.collect(), ..Image::new(self.frame.width, self.frame.height, 3) }
     }
 
+    /// Squared errors of pixels, means over the channels, as those of their values: all channels have the same.
+    pub fn error(&self, of_pixels: &Planes) -> Image {
+        let (width, height) = (self.frame.width, self.frame.height);
+        let of_value = |_, x: usize, y: usize| of_pixels.at(0, x as isize, y as isize).max(0.0);
+        Planes::from_fn(width, height, 3, of_value).to_image(width, height, 1.0 / (self.scale * self.scale))
+    }
+
     /// A half of the samples' colour, times [`Inputs::scale`]; not mirrored.
     pub fn half(&self, half: usize) -> Result<Planes> {
         let [mean, _] = self.frame.half(Layer::BinColor, half)?;

@@ -7,7 +7,6 @@ use crate::error::Result;
 use crate::film::{Frame, Needs};
 use crate::image::nl_means::Guides;
 use crate::image::nl_means::rdfc::{self, Denoised, Options};
-use crate::image::planes::Planes;
 
 /// `rdfc`.
 pub const METHOD: Method = Method {
@@ -50,11 +49,9 @@ impl Reconstruction for Rdfc {
         let options = Options { window: self.window, symmetric: false, choice: self.choice, rows: frame.height };
         let report = |share| (context.progress)("denoise", share);
         let Denoised { image, error } = rdfc::denoise(&Guides { color, features: features.into() }, options, &report);
-        let per_channel = |_, x: usize, y: usize| error.at(0, x as isize, y as isize).max(0.0);
-        let error = Planes::from_fn(frame.width, frame.height, 3, per_channel);
         Ok(Solution {
             image: image.to_image(frame.width, frame.height, 1.0 / inputs.scale),
-            error: Some(error.to_image(frame.width, frame.height, 1.0 / (inputs.scale * inputs.scale))),
+            error: Some(inputs.error(&error)),
             notes: Vec::new(),
         })
     }

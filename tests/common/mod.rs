@@ -57,3 +57,25 @@ pub fn shifted_film(scene: &Scene, spp: u32, seed: u64, needs: Needs, shift: Shi
     let settings = Settings { budget: Budget::Spp(spp), seed, first: 0, needs, shift };
     render(scene, settings, &Control { stop: &AtomicBool::new(false), progress: &|_| {} }).film
 }
+
+/// Over all values, means over sixteen runs of what must be zero in the mean look like it: centred, spread as Student's t
+/// with 15 degrees of freedom, without a tail.
+pub fn check_zero(name: &str, runs: &[Vec<f64>]) {
+    let n = runs.len() as f64;
+    let (mut sum, mut squares, mut beyond, mut count) = (0.0, 0.0, 0, 0.0);
+    for at in 0..runs[0].len() {
+        let mean = runs.iter().map(|run| run[at]).sum::<f64>() / n;
+        let variance = runs.iter().map(|run| (run[at] - mean).powi(2)).sum::<f64>() / (n - 1.0) / n;
+        if variance == 0.0 {
+            assert_eq!(mean, 0.0, "{name}: a value without variance");
+            continue;
+        }
+        let t = mean / variance.sqrt();
+        (sum, squares, count) = (sum + t, squares + t * t, count + 1.0);
+        beyond += usize::from(t.abs() > 4.0);
+    }
+    assert!(count > 500.0 && (sum / count).abs() < 5.0 / f64::sqrt(count), "{name}: mean t {}", sum / count);
+    let spread = (squares / count).sqrt();
+    assert!(spread > 0.8 && spread < 1.2, "{name}: spread {spread} instead of 1.07");
+    assert!(beyond as f64 <= 0.01 * count, "{name}: {beyond} of {count} beyond four");
+}

@@ -231,10 +231,9 @@ impl Blend {
             share * self.color.at(c, x, y) + (1.0 - share) * self.prediction.at(c, x, y)
         };
         let image = Planes::from_fn(width, height, 3, |c, x, y| value(c, x as isize, y as isize));
-        let of_value = Planes::from_fn(width, height, 3, |_, x, y| shares.at(1, x as isize, y as isize) / 3.0);
         Solution {
             image: image.to_image(width, height, 1.0 / inputs.scale),
-            error: Some(of_value.to_image(width, height, 1.0 / (inputs.scale * inputs.scale))),
+            error: Some(inputs.error(&shares.part(1, 1).map(|error| error / 3.0))),
             notes: Vec::new(),
         }
     }

@@ -86,38 +86,27 @@ impl Problem<'_> {
 
     /// Sums of weighted products of a block's columns, and of columns with colours.
     fn add_block(&self, block: (usize, usize), middle: (f32, f32), sums: &mut [f64]) {
-        let of = |blocks: &Blocks| blocks.at(block.0, block.1).to_vec();
-        products(
-            &design(&of(self.features), block, middle),
-            columns(self.features.channels, ORDER),
-            Pixels {
-                color: [0, 1, 2].map(|c| self.color.at(block.0, block.1)[c]),
-                weight: self.weight.at(block.0, block.1)[0],
-            },
-            sums,
-        );
+        let (x, y) = block;
+        let design = design(self.features.at(x, y), block, middle);
+        let count = columns(self.features.channels, ORDER);
+        products(&design[..count], self.color.at(x, y), self.weight.at(x, y)[0], sums);
     }
-}
-
-struct Pixels {
-    color: [Lanes; 3],
-    weight: Lanes,
 }
 
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-fn products(columns: &[Lanes; COLUMNS], count: usize, pixels: Pixels, sums: &mut [f64]) {
+fn products(columns: &[Lanes], color: &[Lanes], weight: Lanes, sums: &mut [f64]) {
     let mut weighted = [Lanes::ZERO; COLUMNS];
-    for i in 0..count {
-        weighted[i] = pixels.weight * columns[i];
+    for (slot, &column) in weighted.iter_mut().zip(columns) {
+        *slot = weight * column;
     }
     let mut slots = sums.iter_mut();
-    for i in 0..count {
+    for i in 0..columns.len() {
         for (column, slot) in columns[..=i].iter().zip(&mut slots) {
             *slot = f64::from((weighted[i] * *column).sum());
         }
     }
-    for weighted in &weighted[..count] {
-        for (color, slot) in pixels.color.iter().zip(&mut slots) {
+    for weighted in &weighted[..columns.len()] {
+        for (color, slot) in color.iter().zip(&mut slots) {
             *slot = f64::from((*weighted * *color).sum());
         }
     }

@@ -92,10 +92,7 @@ impl Reconstruction for Nfor {
         let guide = Guide { mean: mean.clone(), variance: left, tolerance: None };
         let image =
             regress(&mean, &features, &guide, tolerances[1]).to_image(frame.width, frame.height, 1.0 / inputs.scale);
-        let per_channel =
-            Planes::from_fn(frame.width, frame.height, 3, |_, x, y| error.at(0, x as isize, y as isize).max(0.0) / 3.0);
-        let error = per_channel.to_image(frame.width, frame.height, 1.0 / (inputs.scale * inputs.scale));
-        Ok(Solution { image, error: Some(error), notes: Vec::new() })
+        Ok(Solution { image, error: Some(inputs.error(&error.map(|error| error / 3.0))), notes: Vec::new() })
     }
 }
 
