@@ -7,6 +7,7 @@
 #endif
 
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <new>
 
@@ -132,6 +133,24 @@ RTCRay to_rtc(const FluxionRay *ray) {
   return r;
 }
 
+void to_rtc(const FluxionRays *rays, RTCRay16 *r, int *valid) {
+  std::memcpy(r->org_x, rays->origin[0], sizeof r->org_x);
+  std::memcpy(r->org_y, rays->origin[1], sizeof r->org_y);
+  std::memcpy(r->org_z, rays->origin[2], sizeof r->org_z);
+  std::memcpy(r->dir_x, rays->direction[0], sizeof r->dir_x);
+  std::memcpy(r->dir_y, rays->direction[1], sizeof r->dir_y);
+  std::memcpy(r->dir_z, rays->direction[2], sizeof r->dir_z);
+  std::memcpy(r->tfar, rays->t_far, sizeof r->tfar);
+  std::memcpy(valid, rays->active, sizeof rays->active);
+  for (int i = 0; i < FLUXION_PACKET; ++i) {
+    r->tnear[i] = 0.0f;
+    r->time[i] = 0.0f;
+    r->mask[i] = 0xffffffffu;
+    r->id[i] = 0;
+    r->flags[i] = 0;
+  }
+}
+
 }  // namespace
 
 void *fluxion_device_new(const char *config, FluxionErrorFunction function, void *user) {
@@ -229,4 +248,45 @@ bool fluxion_occluded(void *scene, const FluxionRay *ray) {
 #endif
   /* Embree marks an occluded ray with a far end of minus infinity. */
   return query.tfar < 0.0f;
+}
+
+void fluxion_intersect_packet(void *scene, const FluxionRays *rays, bool coherent, FluxionHits *hits) {
+  RTCRayHit16 query;
+  alignas(64) int valid[FLUXION_PACKET];
+  to_rtc(rays, &query.ray, valid);
+  for (int i = 0; i < FLUXION_PACKET; ++i) {
+    query.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
+    query.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
+  }
+#if FLUXION_EMBREE_MAJOR >= 4
+  RTCIntersectArguments arguments;
+  rtcInitIntersectArguments(&arguments);
+  if (coherent) arguments.flags = RTC_RAY_QUERY_FLAG_COHERENT;
+  rtcIntersect16(valid, scene_of(scene), &query, &arguments);
+#else
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  if (coherent) context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+  rtcIntersect16(valid, scene_of(scene), &context, &query);
+#endif
+  std::memcpy(hits->t, query.ray.tfar, sizeof hits->t);
+  std::memcpy(hits->u, query.hit.u, sizeof hits->u);
+  std::memcpy(hits->v, query.hit.v, sizeof hits->v);
+  std::memcpy(hits->geometry, query.hit.geomID, sizeof hits->geometry);
+  std::memcpy(hits->primitive, query.hit.primID, sizeof hits->primitive);
+  std::memcpy(hits->instance, query.hit.instID[0], sizeof hits->instance);
+}
+
+void fluxion_occluded_packet(void *scene, const FluxionRays *rays, uint32_t blocked[FLUXION_PACKET]) {
+  RTCRay16 query;
+  alignas(64) int valid[FLUXION_PACKET];
+  to_rtc(rays, &query, valid);
+#if FLUXION_EMBREE_MAJOR >= 4
+  rtcOccluded16(valid, scene_of(scene), &query, nullptr);
+#else
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  rtcOccluded16(valid, scene_of(scene), &context, &query);
+#endif
+  for (int i = 0; i < FLUXION_PACKET; ++i) blocked[i] = valid[i] && query.tfar[i] < 0.0f ? 0xffffffffu : 0;
 }

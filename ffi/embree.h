@@ -33,6 +33,27 @@ typedef struct FluxionHit {
   uint32_t instance;
 } FluxionHit;
 
+/* Sixteen rays from `t_near` 0 on, coordinate by coordinate, and what they meet; `active` has all bits of a ray's
+ * word or none. The geometry of a ray that meets nothing is FLUXION_NO_GEOMETRY; inactive rays have no hit. */
+#define FLUXION_PACKET 16
+#define FLUXION_NO_GEOMETRY 0xffffffffu
+
+typedef struct FluxionRays {
+  float origin[3][FLUXION_PACKET];
+  float direction[3][FLUXION_PACKET];
+  float t_far[FLUXION_PACKET];
+  uint32_t active[FLUXION_PACKET];
+} FluxionRays;
+
+typedef struct FluxionHits {
+  float t[FLUXION_PACKET];
+  float u[FLUXION_PACKET];
+  float v[FLUXION_PACKET];
+  uint32_t geometry[FLUXION_PACKET];
+  uint32_t primitive[FLUXION_PACKET];
+  uint32_t instance[FLUXION_PACKET];
+} FluxionHits;
+
 typedef enum FluxionQuadricKind {
   FLUXION_DISK,    /* x² + y² <= 1 in the plane z = 0 */
   FLUXION_CYLINDER /* x² + y² = 1 for z in [0, 1], open at both ends */
@@ -68,6 +89,10 @@ void fluxion_scene_release(void *scene);
 
 bool fluxion_intersect(void *scene, const FluxionRay *ray, FluxionHit *hit);
 bool fluxion_occluded(void *scene, const FluxionRay *ray);
+/* `coherent`: the rays start close together and run side by side, as those of a camera. */
+void fluxion_intersect_packet(void *scene, const FluxionRays *rays, bool coherent, FluxionHits *hits);
+/* `blocked` gets all bits of a blocked ray's word. */
+void fluxion_occluded_packet(void *scene, const FluxionRays *rays, uint32_t blocked[FLUXION_PACKET]);
 
 #ifdef __cplusplus
 }

@@ -7,6 +7,7 @@ use common::{ALL, bundled, check_zero, film, shifted_film};
 use fluxion::film::{Layer, Needs};
 use fluxion::image::Image;
 use fluxion::math::{Vec3, rng, vec2, vec3};
+use fluxion::math::lanes::Lanes3;
 use fluxion::render::gradient::shift::{Shift, half_vector, reconnect};
 
 /// Independent pairs of a gradient render and a path-traced one.
@@ -189,8 +190,12 @@ fn reconnection_jacobians_invert_each_other_and_are_the_change_of_solid_angle() 
             target.p + target.frame.to_world(direction(i)) * 1.5,
             target.p + target.frame.to_world(direction(i + 500)),
         );
-        let jacobian = reconnect::jacobian(base, offset, &target);
-        assert!((jacobian * reconnect::jacobian(offset, base, &target) - 1.0).abs() < 1e-4);
+        let change = |from: Vec3, to: Vec3| {
+            let [from, to, p, n] = [from, to, target.p, target.n].map(Lanes3::splat);
+            reconnect::jacobian(from, to, (p, n)).0[3]
+        };
+        let jacobian = change(base, offset);
+        assert!((jacobian * change(offset, base) - 1.0).abs() < 1e-4);
         // Directions from the base, by way of the target's plane, as directions from the offset.
         let map = |w: Vec3| {
             let t = (target.p - base).dot(target.n) / w.dot(target.n);

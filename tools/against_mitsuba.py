@@ -181,7 +181,7 @@ def speed(scenes, spp="8"):
     import mitsuba as mi
     print("| scene | path | gradient | cost of a gradient sample | scalar_rgb | llvm_ad_rgb | path / scalar | path / llvm |")
     print("|---|---|---|---|---|---|---|---|")
-    for name in ("cornell-box", "kitchen"):
+    for name in ("cornell-box", "kitchen", "veach-ajar", "living-room", "classroom"):
         path = os.path.join(scenes, name, "scene.xml")
         size = (512, 512) if name == "cornell-box" else (640, 360)
         rates = {"path": [], "gradient": [], "scalar_rgb": [], "llvm_ad_rgb": []}

@@ -11,7 +11,6 @@ use fluxion::error::Error;
 use fluxion::film::{Frame, Needs, exr};
 use fluxion::plan::Plan;
 use fluxion::reconstruct::{Reconstruction, Solution};
-use fluxion::render::gradient::Tracer;
 use fluxion::render::gradient::shift::{SHIFTS, Shift};
 use fluxion::render::{self, Budget, Control, Outcome, SampleId, Settings};
 use fluxion::scene::{Scene, load};
@@ -299,7 +298,7 @@ fn replay(args: &Args, scene: &Scene, (x, y, index): (usize, usize, u32)) -> Res
         bail!(Error::Usage(format!("pixel {x},{y} is outside the film of {}x{}", sensor.width, sensor.height)));
     }
     let id = SampleId { seed: args.seed, x, y, index };
-    let sample = render::sample(scene, id, true, Some(&mut Tracer::new(shift(args), true)));
+    let sample = render::sample(scene, id, shift(args));
     println!("{sample:#?}");
     Ok(ExitCode::SUCCESS)
 }

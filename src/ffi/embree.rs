@@ -33,6 +33,11 @@ pub use raw::FluxionQuadricKind as QuadricKind;
 /// A ray; `t` counts in units of the direction's length, which need not be one.
 pub use raw::FluxionRay as Ray;
 
+/// What sixteen rays met.
+pub use raw::FluxionHits as Hits;
+/// Sixteen rays, coordinate by coordinate.
+pub use raw::FluxionRays as Rays;
+
 /// What Embree's error callback has said, waiting to be fetched after the call that caused it.
 type Complaint = Mutex<Option<String>>;
 
@@ -121,6 +126,21 @@ impl Hit {
     /// The instance that was entered, if the surface is in one.
     pub fn instance(&self) -> Option<u32> {
         (self.instance != raw::FLUXION_NO_INSTANCE).then_some(self.instance)
+    }
+}
+
+impl Hits {
+    /// What a ray has met.
+    #[inline]
+    pub fn get(&self, lane: usize) -> Option<Hit> {
+        (self.geometry[lane] != raw::FLUXION_NO_GEOMETRY).then(|| Hit {
+            t: self.t[lane],
+            u: self.u[lane],
+            v: self.v[lane],
+            geometry: self.geometry[lane],
+            primitive: self.primitive[lane],
+            instance: self.instance[lane],
+        })
     }
 }
 
@@ -262,6 +282,26 @@ impl Committed {
         // SAFETY: as above.
         unsafe { raw::fluxion_occluded(self.0.raw, ray) }
     }
+
+    /// The first surfaces along the active ones of sixteen rays. `coherent`: they start and run close together.
+    #[inline]
+    pub fn intersect_packet(&self, rays: &Rays, coherent: bool) -> Hits {
+        let mut hits = std::mem::MaybeUninit::uninit();
+        // SAFETY: the scene is committed; both pointers are valid for the call, which writes every field.
+        unsafe {
+            raw::fluxion_intersect_packet(self.0.raw, rays, coherent, hits.as_mut_ptr());
+            hits.assume_init()
+        }
+    }
+
+    /// Which of sixteen rays meet anything: all bits of a word or none.
+    #[inline]
+    pub fn occluded_packet(&self, rays: &Rays) -> [u32; 16] {
+        let mut blocked = [0; 16];
+        // SAFETY: as above; there is room for every word.
+        unsafe { raw::fluxion_occluded_packet(self.0.raw, rays, blocked.as_mut_ptr()) }
+        blocked
+    }
 }
 
 #[cfg(test)]
@@ -295,6 +335,36 @@ mod tests {
         assert!((hit.t - 0.5).abs() < 1e-5);
         assert!(scene.intersect(&ray(2.0, 2.0)).is_none());
         assert!(scene.occluded(&ray(0.25, 0.5)) && !scene.occluded(&ray(2.0, 2.0)));
+    }
+
+    #[test]
+    fn packets_meet_what_single_rays_meet_and_inactive_rays_nothing() {
+        let device = Device::new(1).unwrap();
+        let (vertices, indices) = unit_triangle();
+        let mut builder = device.scene();
+        builder.add_triangles(&vertices, &indices).unwrap();
+        builder.add_spheres(vec![[1.5, 0.5, 0.0, 0.25]]).unwrap();
+        let scene = builder.commit().unwrap();
+        let x: [f32; 16] = std::array::from_fn(|i| 0.05 + 0.12 * i as f32);
+        let (zero, one) = ([0.0; 16], [1.0; 16]);
+        let active = std::array::from_fn(|i| if i % 5 == 4 { 0 } else { !0 });
+        let rays = Rays {
+            origin: [x, [0.4; 16], one],
+            direction: [zero, zero, one.map(|_| -1.0)],
+            t_far: [f32::INFINITY; 16],
+            active,
+        };
+        for coherent in [false, true] {
+            let (hits, blocked) = (scene.intersect_packet(&rays, coherent), scene.occluded_packet(&rays));
+            for i in 0..16 {
+                let single = scene.intersect(&ray(x[i], 0.4)).filter(|_| active[i] != 0);
+                let found = hits.get(i);
+                assert_eq!((single.is_some(), single.is_some()), (found.is_some(), blocked[i] != 0), "ray {i}");
+                let Some((a, b)) = single.zip(found) else { continue };
+                assert_eq!((a.geometry, a.primitive, a.instance()), (b.geometry, b.primitive, b.instance()));
+                assert!((a.t - b.t).abs() < 1e-5 && (a.u - b.u).abs() < 1e-5 && (a.v - b.v).abs() < 1e-5);
+            }
+        }
     }
 
     #[test]

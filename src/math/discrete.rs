@@ -8,6 +8,8 @@ use super::{Vec2, vec2};
 pub struct Discrete {
     /// Running sums, starting with 0 and ending with the total.
     cumulative: Vec<f64>,
+    /// The index that the start of each of as many equal parts of the total falls on, so that searches are short.
+    guide: Vec<u32>,
 }
 
 impl Discrete {
@@ -19,7 +21,16 @@ impl Discrete {
             total += f64::from(weight);
             cumulative.push(total);
         }
-        (total > 0.0 && total.is_finite()).then_some(Self { cumulative })
+        if !(total > 0.0 && total.is_finite()) {
+            return None;
+        }
+        let n = cumulative.len() - 1;
+        let start = |part: usize| {
+            let target = part as f64 / n as f64 * total;
+            cumulative.partition_point(|&sum| sum <= target).saturating_sub(1).min(n - 1) as u32
+        };
+        let guide = (0..n).map(start).collect();
+        Some(Self { cumulative, guide })
     }
 
     /// Sum of all weights.
@@ -28,10 +39,18 @@ impl Discrete {
     }
 
     /// The index that `u` in [0, 1) falls on, and `u` stretched to [0, 1) within it for further use.
+    #[inline]
     pub fn sample(&self, u: f32) -> (usize, f32) {
         let target = f64::from(u) * self.total();
-        let last = self.cumulative.len() - 2;
-        let mut index = self.cumulative.partition_point(|&sum| sum <= target).saturating_sub(1).min(last);
+        let last = self.guide.len() - 1;
+        let mut index = self.guide[((u * self.guide.len() as f32) as usize).min(last)] as usize;
+        while index < last && self.cumulative[index + 1] <= target {
+            index += 1;
+        }
+        // Parts are found in floats, which may round up.
+        while index > 0 && self.cumulative[index] > target {
+            index -= 1;
+        }
         // Rounding may end on an entry without weight, beside the one that was meant.
         while index > 0 && self.cumulative[index + 1] == self.cumulative[index] {
             index -= 1;

@@ -1,5 +1,6 @@
 //! Vectors, frames, random numbers and the small pieces of sampling everything else is made of.
 
+pub mod alias;
 pub mod discrete;
 pub mod frame;
 pub mod fresnel;
@@ -9,7 +10,7 @@ pub mod rng;
 pub mod warp;
 
 pub use frame::Frame;
-pub use glam::{Mat4, Vec2, Vec3, vec2, vec3};
+pub use glam::{Mat4, Vec2, Vec3, Vec4, vec2, vec3};
 
 /// Linear RGB: radiance, reflectance or throughput, by context.
 pub type Rgb = Vec3;

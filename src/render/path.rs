@@ -1,197 +1,110 @@
 //! Path tracing with next-event estimation and multiple importance sampling (Veach 1997), depths as Mitsuba's
-//! `path` integrator counts them.
+//! `path` integrator counts them. What happens at a vertex, to sixteen paths at a time.
 
-use super::{Sampler, View};
-use crate::film::{Features, Sample};
-use crate::math::frame::Frame;
-use crate::math::{Rgb, Vec2, Vec3, vec2, warp};
-use crate::scene::bsdf::{BsdfSample, Eval, Lobe};
+use super::Sampler;
+use super::paths::{Packet, Paths};
+use super::vertices::Vertices;
+use crate::math::Rgb;
+use crate::math::lanes::{Bits, Lanes, Lanes3, Mask};
 use crate::scene::emitter::LightPoint;
-use crate::scene::{Ray, Scene, Surface};
+use crate::scene::{Integrator, Scene};
 
 /// Chance of surviving Russian roulette is never above this, so that paths in white rooms end.
 const MAX_SURVIVAL: f32 = 0.95;
 
-/// A point on an emitter chosen at a vertex, seen from there and lighting it.
-#[derive(Clone, Copy, Debug)]
-pub struct Light {
+/// An emitter that a path has run into.
+pub struct Met {
     /// The point.
-    pub point: LightPoint,
-    /// Radiance it sends to the vertex.
-    pub radiance: Rgb,
-    /// Local direction towards it.
-    pub wo: Vec3,
-    /// Scattering from it: f |cos θ|, and the density of choosing the direction by the BSDF.
-    pub eval: Eval,
-    /// Density of choosing the point, per solid angle.
-    pub pdf: f32,
-}
-
-/// The direction a path takes at a vertex.
-#[derive(Clone, Copy, Debug)]
-pub struct Scatter {
-    /// The sampled direction.
-    pub bsdf: BsdfSample,
-    /// Chance of having survived Russian roulette after it.
-    pub survival: f32,
-}
-
-/// An emitter that a path has run into by scattering.
-#[derive(Clone, Copy, Debug)]
-pub struct Emission {
-    /// The point that was met.
     pub point: LightPoint,
     /// Radiance it sends back.
     pub radiance: Rgb,
     /// Density with which next-event estimation would have chosen it; 0 after a delta lobe.
     pub light_pdf: f32,
+    /// What it adds to the colour of the sample.
+    pub color: Rgb,
 }
 
-/// Watches a path as it is traced.
-pub trait Recorder {
-    /// A surface is reached with this throughput: f cos / pdf of everything before.
-    fn vertex(&mut self, _surface: &Surface, _throughput: Rgb, _roughness: Option<f32>) {}
-    /// The latest vertex is lit by a visible emitter point.
-    fn light(&mut self, _light: Light) {}
-    /// The path goes on from the latest vertex.
-    fn scatter(&mut self, _scatter: Scatter) {}
-    /// Going on from the latest vertex, the path meets an emitter.
-    fn emission(&mut self, _emission: Emission) {}
-}
-
-impl Recorder for () {}
-
-/// Power heuristic with exponent two, for a sample drawn with density `p` against one with `q`.
-fn power_heuristic(p: f32, q: f32) -> f32 {
-    let ratio = q / p;
-    1.0 / (1.0 + ratio * ratio)
-}
-
-/// Traces the path of a view. Edges are left zero.
-pub fn trace(scene: &Scene, sampler: &Sampler, view: View, recorder: &mut impl Recorder) -> Sample {
-    let integrator = scene.integrator();
-    let mut ray = view.ray(scene);
-    let mut sample = Sample { features: far(scene, ray), ..Sample::default() };
-    let (mut throughput, mut eta, mut depth) = (Rgb::ONE, 1.0, 0);
-    let mut features = FeatureWalk::default();
-    // Where the last direction came from, with its density; none for the camera.
-    let mut last: Option<(Vec3, BsdfSample)> = None;
-    loop {
-        let hit = if last.is_none() { scene.intersect_from_camera(ray) } else { scene.intersect(ray) };
-        let point = hit.as_ref().map_or_else(|| scene.environment(ray.direction), |hit| scene.light_point(hit));
-        if let Some(point) = point.filter(|_| integrator.max_depth > 0) {
-            let radiance = scene.radiance(&point, -ray.direction);
-            if radiance != Rgb::ZERO {
-                match last {
-                    None if integrator.hide_emitters => {}
-                    None => sample.direct = radiance,
-                    Some((from, bsdf)) => {
-                        let light_pdf = if bsdf.lobe.is_delta() { 0.0 } else { scene.emitter_pdf(from, &point) };
-                        sample.color += throughput * radiance * power_heuristic(bsdf.pdf, light_pdf);
-                        recorder.emission(Emission { point, radiance, light_pdf });
-                    }
-                }
-            }
-        }
-        let Some(surface) = hit else { break };
-        let bsdf = scene.bsdf(&surface);
-        let roughness = bsdf.roughness(&surface);
-        features.visit(&mut sample.features, scene, &surface, ray.origin, roughness.is_some());
-        if depth + 1 >= integrator.max_depth {
-            break;
-        }
-        recorder.vertex(&surface, throughput, roughness);
-        let [choice, u, v, survival] = sampler.light(depth);
-        if roughness.is_some() {
-            if let Some(light) = light(scene, &surface, choice, vec2(u, v)) {
-                let weight = power_heuristic(light.pdf, light.eval.pdf) / light.pdf;
-                sample.color += throughput * light.eval.value * light.radiance * weight;
-                recorder.light(light);
-            }
-        }
-        let [lobe, u, v, _] = sampler.scatter(depth);
-        let Some(scattered) = bsdf.sample(&surface, surface.wi, lobe, vec2(u, v)) else { break };
-        throughput *= scattered.weight;
-        eta *= scattered.eta;
-        depth += 1;
-        let brightest = throughput.max_element();
-        let roulette = depth >= integrator.rr_depth;
-        let chance = if roulette { (brightest * eta * eta).min(MAX_SURVIVAL) } else { 1.0 };
-        if brightest <= 0.0 || (roulette && survival >= chance) {
-            break;
-        }
-        throughput /= chance;
-        sample.ambient.color += throughput;
-        recorder.scatter(Scatter { bsdf: scattered, survival: chance });
-        features.pass(&scattered);
-        last = Some((surface.p, scattered));
-        ray = surface.ray(scattered.wo);
-    }
-    sample
-}
-
-/// A visible emitter point that lights the surface, or none.
-fn light(scene: &Scene, surface: &Surface, choice: f32, u: Vec2) -> Option<Light> {
-    let (point, pdf) = scene.sample_emitter(surface, choice, u)?;
-    let direction = point.direction(surface.p);
-    let wo = surface.to_local(direction);
-    let mut eval = scene.bsdf(surface).eval(surface, surface.wi, wo);
-    eval.pdf = point.scatter_pdf(eval.pdf);
+/// The emitter at the end of a path's latest segment: the surface it has met if `met`, else what surrounds the scene.
+pub fn emission(scene: &Scene, packet: &Packet, vertices: &Vertices, lane: usize, met: bool) -> Option<Met> {
+    let direction = packet.rays.direction.get(lane);
+    let point = if met { scene.light_point_of(&vertices.surfaces, lane) } else { scene.environment(direction) }?;
     let radiance = scene.radiance(&point, -direction);
-    let lit = eval.value * radiance != Rgb::ZERO && scene.visible(surface, &point);
-    lit.then_some(Light { point, radiance, wo, eval, pdf })
-}
-
-/// Follows a path to the first surface with a smooth lobe, keeping the colour of what it passes.
-#[derive(Default)]
-struct FeatureWalk {
-    found: bool,
-    length: f32,
-    tint: Option<Rgb>,
-}
-
-impl FeatureWalk {
-    fn visit(&mut self, features: &mut Features, scene: &Scene, surface: &Surface, from: Vec3, smooth: bool) {
-        if self.found {
-            return;
-        }
-        self.length += surface.p.distance(from);
-        // The first surface stands in until a better one is found.
-        if smooth || self.tint.is_none() {
-            let tint = self.tint.unwrap_or(Rgb::ONE);
-            let side = if surface.wi.z < 0.0 { -1.0 } else { 1.0 };
-            let albedo = scene.bsdf(surface).albedo(surface) * tint;
-            let (normal, depth) = (surface.frame.n * side, self.length);
-            *features = Features { albedo, normal, depth, position: surface.p, ..*features };
-        }
-        self.found = smooth;
+    if radiance == Rgb::ZERO {
+        return None;
     }
-
-    fn pass(&mut self, scattered: &BsdfSample) {
-        // What a boundary squeezes radiance by is not its colour.
-        let color = match scattered.lobe {
-            Lobe::DeltaTransmit => scattered.weight * (scattered.eta * scattered.eta),
-            _ => scattered.weight,
-        };
-        self.tint = Some(self.tint.unwrap_or(Rgb::ONE) * color.clamp(Rgb::ZERO, Rgb::ONE));
-    }
+    let smooth = packet.smooth.get(lane);
+    let light_pdf = if smooth { scene.emitter_pdf(packet.from.get(lane), &point) } else { 0.0 };
+    let ratio = light_pdf / packet.pdf.0[lane];
+    let color = packet.throughput.get(lane) * radiance / (1.0 + ratio * ratio);
+    Some(Met { point, radiance, light_pdf, color })
 }
 
-/// Ambient occlusion reaches so far, over the size of the scene.
-const OPEN: f32 = 0.1;
-
-/// Whether a direction from the features' surface, chosen by its cosine, is open: 1 or 0.
-pub fn occlusion(scene: &Scene, features: &Features, u: Vec2) -> f32 {
-    if features.normal == Vec3::ZERO {
-        return 1.0;
-    }
-    let direction = Frame::around(features.normal).to_world(warp::cosine_hemisphere(u));
-    f32::from(u8::from(scene.is_open(features.position, features.normal, direction, OPEN)))
+/// Lights the active ones of some vertices by emitter points; returns the light that reaches the camera.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
+pub fn light(scene: &Scene, sampler: &Sampler, depth: u32, hash: Bits, vertices: &mut Vertices, active: Mask) -> Lanes3 {
+    let Vertices { surfaces, materials, light, throughput, .. } = vertices;
+    let numbers = sampler.light(hash, depth);
+    let (found, pdf) = scene.sample_lights(surfaces, active, (numbers.choice, numbers.point), &mut light.points);
+    let (direction, _) = light.points.seen_from(surfaces.p);
+    let wo = surfaces.frame.to_local(direction);
+    let mut evals = materials.eval(scene, surfaces, (surfaces.wi, wo), found);
+    evals.pdf = light.points.scatter_pdf(evals.pdf);
+    let radiance = scene.light_radiance(&light.points, direction, found & evals.value.nonzero());
+    let lit = found & evals.value.scale(radiance).nonzero();
+    (light.radiance, light.wo, light.evals, light.pdf) = (radiance, wo, evals, pdf);
+    vertices.lit = if lit.any() { scene.visible_packet(surfaces, &light.points, lit) } else { lit };
+    // The power heuristic with exponent two, over the density.
+    let ratio = evals.pdf / pdf;
+    let weight = Lanes::splat(1.0) / (pdf * (Lanes::splat(1.0) + ratio * ratio));
+    vertices.lit.select3(throughput.scale(evals.value).scale(radiance) * weight, Lanes3::ZERO)
 }
 
-/// The features of a ray that meets nothing: beyond everything.
-fn far(scene: &Scene, Ray { origin, direction, .. }: Ray) -> Features {
-    let (center, radius) = scene.bounds().sphere();
-    let depth = origin.distance(center) + radius;
-    Features { depth, position: origin + direction * depth, occlusion: 1.0, ..Features::default() }
+/// Chooses where the active ones of some paths go on; returns those whose throughput is not finite.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
+pub fn scatter(
+    (scene, sampler): (&Scene, &Sampler),
+    depth: u32,
+    packet: &Packet,
+    vertices: &mut Vertices,
+    first_place: u32,
+    onward: &mut Paths,
+) -> Mask {
+    let Vertices { surfaces, materials, scatters, .. } = vertices;
+    let numbers = sampler.scatter(packet.hash, depth);
+    let choices = (numbers.lobe, numbers.direction);
+    let found = materials.sample(scene, surfaces, choices, vertices.met, scatters);
+    let throughput = packet.throughput.scale(scatters.weight);
+    let sum = throughput.x + throughput.y + throughput.z;
+    let broken = found & !sum.abs().less(Lanes::splat(f32::INFINITY));
+    let eta = packet.eta * scatters.eta;
+    let brightest = throughput.max_element();
+    let Integrator { rr_depth, .. } = scene.integrator();
+    let one = Lanes::splat(1.0);
+    let mut alive = found & brightest.greater(Lanes::ZERO);
+    vertices.survival = one;
+    if depth + 1 >= rr_depth {
+        vertices.survival = (brightest * eta * eta).min(Lanes::splat(MAX_SURVIVAL));
+        alive = alive & numbers.survival.less(vertices.survival);
+    }
+    vertices.scattered = alive;
+    let throughput = throughput * (one / vertices.survival);
+    let direction = surfaces.frame.to_world(scatters.wo).normalize_or(Lanes3::ZERO);
+    let origin = surfaces.leave(direction);
+    let smooth = scatters.smooth();
+    for lane in alive.lanes() {
+        vertices.next.0[lane] = onward.len() as u32;
+        let (to, slot) = onward.push();
+        to.rays.origin.set(slot, origin.get(lane));
+        to.rays.direction.set(slot, direction.get(lane));
+        to.rays.t_far.0[slot] = f32::INFINITY;
+        to.throughput.set(slot, throughput.get(lane));
+        to.eta.0[slot] = eta.0[lane];
+        to.pdf.0[slot] = scatters.pdf.0[lane];
+        to.smooth.0[slot] = smooth.0[lane];
+        to.from.set(slot, surfaces.p.get(lane));
+        to.id.0[slot] = packet.id.0[lane];
+        to.hash.0[slot] = packet.hash.0[lane];
+        to.parent.0[slot] = first_place + lane as u32;
+    }
+    broken
 }

@@ -1,98 +1,217 @@
 //! Random numbers as a pure function of seed, pixel, sample and dimension.
 //!
-//! Samples are dealt to bins in turn. Within a bin they follow an Owen-scrambled Sobol sequence (Burley 2020);
-//! the scrambling of different bins and pixels is independent, so that differences between bins tell variance.
-//! Every bounce owns its dimensions, whatever happened before it.
+//! Samples are dealt to bins in turn. Within a bin every two dimensions follow the first two of Sobol's sequence,
+//! shuffled and scrambled after Owen by hashes (Burley 2020); pairs, pixels and bins are scrambled apart, so that
+//! differences between bins tell variance. Every bounce owns its dimensions, whatever happened before it.
+//!
+//! All pixels have the same position on the film in samples of the same number: the camera's ray of a pixel is then the
+//! ray that a path of its neighbour is shifted to.
 
-use super::SampleId;
 use crate::film::BINS;
+use crate::math::lanes::{Bits, Lanes};
 use crate::math::{Vec2, rng, vec2};
 
-/// Dimension sets of four that the sequence has; later bounces fall back to hashing.
-const SETS: u32 = sobol_burley::NUM_DIMENSION_SETS_4D;
-/// Samples of a bin that the sequence has.
-const LENGTH: u32 = 1 << 16;
-
-/// The numbers of one sample.
+/// The place in the sequences of all samples of one number.
 #[derive(Clone, Copy, Debug)]
 pub struct Sampler {
-    hash: u64,
-    index: u32,
+    seed: u64,
+    bin: u64,
+    /// Number within the bin, its bits in reverse.
+    reversed: u32,
+}
+
+/// The numbers of the vertex after some scattering events that choose its light.
+#[derive(Clone, Copy, Debug)]
+pub struct LightNumbers {
+    /// Chooses the emitter.
+    pub choice: Lanes,
+    /// Choose the point on it.
+    pub point: [Lanes; 2],
+}
+
+/// The numbers of a vertex that choose where a path goes on.
+#[derive(Clone, Copy, Debug)]
+pub struct ScatterNumbers {
+    /// Chooses the lobe.
+    pub lobe: Lanes,
+    /// Choose the direction.
+    pub direction: [Lanes; 2],
+    /// Decides on survival.
+    pub survival: Lanes,
 }
 
 impl Sampler {
-    /// The numbers of a sample in a film of `width` columns.
-    pub fn new(id: SampleId, width: usize) -> Self {
-        let pixel = (id.y * width + id.x) as u64;
-        let bin = u64::from(id.index) % BINS as u64;
-        let hash = rng::combine(rng::combine(rng::mix(id.seed), pixel), bin);
-        Self { hash, index: id.index / BINS as u32 }
+    /// Sample number `index` of every pixel of a render with this seed.
+    pub fn new(seed: u64, index: u32) -> Self {
+        let bin = u64::from(index) % BINS as u64;
+        Self { seed: rng::mix(seed), bin, reversed: (index / BINS as u32).reverse_bits() }
     }
 
-    /// Position within the pixel and, behind it, on the lens.
-    pub fn camera(&self) -> [f32; 4] {
-        self.set(0)
+    /// What tells the numbers of pixel number `pixel` from others'.
+    pub fn hash(&self, pixel: u64) -> u32 {
+        fold(rng::combine(rng::combine(self.seed, pixel), self.bin))
     }
 
-    /// Choice of emitter, position on it, and survival, at the vertex after `depth` scattering events.
-    pub fn light(&self, depth: u32) -> [f32; 4] {
-        self.set(2 * depth + 1)
+    /// Position within the pixel, the same for all.
+    pub fn film(&self) -> Vec2 {
+        let hash = fold(rng::combine(rng::combine(self.seed, u64::MAX), self.bin));
+        let [x, y] = self.pair(Bits::splat(hash));
+        vec2(x.0[0], y.0[0])
     }
 
-    /// Choice of lobe and direction at that vertex.
-    pub fn scatter(&self, depth: u32) -> [f32; 4] {
-        self.set(2 * depth + 2)
+    /// Positions on the lens for pixels of these hashes.
+    #[inline(always)]
+    pub fn lens(&self, hashes: Bits) -> [Lanes; 2] {
+        self.pair(part(hashes, 0))
     }
 
-    /// A direction for ambient occlusion.
-    pub fn occlusion(&self) -> Vec2 {
-        let [u, v, ..] = self.set(u32::MAX >> 2);
-        vec2(u, v)
+    /// Directions for ambient occlusion.
+    #[inline(always)]
+    pub fn occlusion(&self, hashes: Bits) -> [Lanes; 2] {
+        self.pair(part(hashes, 1))
     }
 
-    #[inline]
-    fn set(&self, set: u32) -> [f32; 4] {
-        if set < SETS && self.index < LENGTH {
-            return sobol_burley::sample_4d(self.index, set, (self.hash ^ (self.hash >> 32)) as u32);
-        }
-        let base = rng::combine(rng::combine(self.hash, u64::from(self.index)), u64::from(set) << 2);
-        [0, 1, 2, 3].map(|lane| rng::unit(rng::combine(base, lane)))
+    /// The light of the vertex after `depth` scattering events.
+    #[inline(always)]
+    pub fn light(&self, hashes: Bits, depth: u32) -> LightNumbers {
+        let first = depth.wrapping_mul(4).wrapping_add(2);
+        let [choice, _] = self.pair(part(hashes, first.wrapping_add(1)));
+        LightNumbers { choice, point: self.pair(part(hashes, first)) }
     }
+
+    /// The way on from that vertex.
+    #[inline(always)]
+    pub fn scatter(&self, hashes: Bits, depth: u32) -> ScatterNumbers {
+        let first = depth.wrapping_mul(4).wrapping_add(4);
+        let [lobe, survival] = self.pair(part(hashes, first.wrapping_add(1)));
+        ScatterNumbers { lobe, direction: self.pair(part(hashes, first)), survival }
+    }
+
+    /// Two dimensions. Everything happens with bits in reverse, where scrambling after Owen is a hash that only carries
+    /// upwards.
+    #[inline(always)]
+    fn pair(&self, hashes: Bits) -> [Lanes; 2] {
+        let shuffled = scramble(Bits::splat(self.reversed), hashes);
+        let index = shuffled.map(u32::reverse_bits);
+        [dimension(index, hashes, 0x68bc_21eb), dimension(second_dimension(index), hashes, 0x02e5_be93)]
+    }
+}
+
+/// The values of one dimension, scrambled.
+#[inline(always)]
+fn dimension(values: Bits, hashes: Bits, salt: u32) -> Lanes {
+    let hashes = hashes.map(|hash| mix(hash ^ salt));
+    scramble(values, hashes).map(u32::reverse_bits).unit()
+}
+
+fn fold(hash: u64) -> u32 {
+    (hash ^ (hash >> 32)) as u32
+}
+
+#[inline(always)]
+fn part(hashes: Bits, number: u32) -> Bits {
+    hashes.map(|hash| mix(hash.wrapping_add(number.wrapping_mul(0x9e37_79b9))))
+}
+
+/// Mixes 32 bits so that every input bit flips every output bit with probability one half.
+#[inline(always)]
+fn mix(x: u32) -> u32 {
+    let x = (x ^ (x >> 16)).wrapping_mul(0x21f0_aaad);
+    let x = (x ^ (x >> 15)).wrapping_mul(0xd35a_2d97);
+    x ^ (x >> 15)
+}
+
+/// A permutation by a hash in which each bit depends on lower bits only (Laine and Karras 2011, with the constants of
+/// Vegdahl 2021).
+#[inline(always)]
+fn scramble(values: Bits, hashes: Bits) -> Bits {
+    values.zip(hashes, |x, hash| {
+        let x = x ^ x.wrapping_mul(0x3d20_adea);
+        let x = x.wrapping_add(hash).wrapping_mul((hash >> 16) | 1);
+        let x = x ^ x.wrapping_mul(0x0552_6c56);
+        x ^ x.wrapping_mul(0x53a2_2864)
+    })
+}
+
+/// Sobol's second dimension, in reverse. Its matrix is Pascal's triangle modulo 2, whose entry (j, b) is odd when the bits
+/// of j are among those of b: a sum over supersets, one bit of the positions at a time.
+#[inline(always)]
+fn second_dimension(index: Bits) -> Bits {
+    index.map(|x| {
+        let x = x ^ ((x >> 1) & 0x5555_5555);
+        let x = x ^ ((x >> 2) & 0x3333_3333);
+        let x = x ^ ((x >> 4) & 0x0f0f_0f0f);
+        let x = x ^ ((x >> 8) & 0x00ff_00ff);
+        x ^ ((x >> 16) & 0x0000_ffff)
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    /// 40 vertices' numbers of a pixel.
     fn numbers(index: u32) -> Vec<f32> {
-        let sampler = Sampler::new(SampleId { seed: 3, x: 5, y: 7, index }, 100);
-        (0..40).flat_map(|depth| sampler.light(depth).into_iter().chain(sampler.scatter(depth))).collect()
+        let sampler = Sampler::new(3, index);
+        let hashes = Bits::splat(sampler.hash(705));
+        let mut numbers = Vec::new();
+        for depth in 0..40 {
+            let LightNumbers { choice, point } = sampler.light(hashes, depth);
+            let ScatterNumbers { lobe, direction, survival } = sampler.scatter(hashes, depth);
+            numbers.extend([choice, survival, lobe].into_iter().chain(point).chain(direction).map(|lanes| lanes.0[5]));
+        }
+        numbers
     }
 
     #[test]
     fn numbers_are_in_range_uniform_in_every_dimension_and_repeatable() {
         let n = 4096;
-        let mut means = vec![0.0f64; 320];
+        let mut means = vec![0.0f64; 280];
         for index in 0..n {
             for (mean, value) in means.iter_mut().zip(numbers(index)) {
                 assert!((0.0..1.0).contains(&value));
                 *mean += f64::from(value) / f64::from(n);
             }
         }
-        // Five standard errors of independent numbers; the sequence does better, the hash does not.
+        // Five standard errors of independent numbers; the sequence does better.
         means.iter().for_each(|mean| assert!((mean - 0.5).abs() < 5.0 * (1.0 / 12.0 / f64::from(n)).sqrt()));
         assert_eq!(numbers(17), numbers(17));
         assert_ne!(numbers(17), numbers(18));
     }
 
     #[test]
-    fn samples_of_a_bin_are_stratified_and_bins_are_scrambled_apart() {
-        let camera = |index| Sampler::new(SampleId { seed: 3, x: 5, y: 7, index }, 100).camera()[0];
-        for bin in 0..8 {
-            let mut strata = [0; 16];
-            (0..16).for_each(|i| strata[(camera(bin + 8 * i) * 16.0) as usize] += 1);
-            assert_eq!(strata, [1; 16]);
+    fn every_pair_of_dimensions_is_stratified_in_all_elementary_boxes() {
+        for first in [0, 64] {
+            let points: Vec<[f32; 2]> = (first..first + 64)
+                .map(|i| {
+                    let sampler = Sampler::new(3, 8 * i + 5);
+                    let [u, v] = sampler.scatter(Bits::splat(sampler.hash(9)), 4).direction;
+                    [u.0[0], v.0[0]]
+                })
+                .collect();
+            for columns in [1, 2, 4, 8, 16, 32, 64] {
+                let rows = 64 / columns;
+                let mut boxes = [0; 64];
+                let cell = |x: f32, n: usize| (x * n as f32) as usize;
+                points.iter().for_each(|[u, v]| boxes[cell(*u, columns) * rows + cell(*v, rows)] += 1);
+                assert_eq!(boxes, [1; 64], "{columns} columns");
+            }
         }
+    }
+
+    #[test]
+    fn bins_and_pixels_are_scrambled_apart_and_the_film_is_shared() {
+        let camera = |index| Sampler::new(3, index).film();
         assert!((0..7).all(|bin| camera(bin) != camera(bin + 1)));
+        let lens = |index, pixel| {
+            let sampler = Sampler::new(3, index);
+            sampler.lens(Bits::splat(sampler.hash(pixel)))[0].0[0]
+        };
+        // Correlation over many pixels, of neighbours and of bins; five standard errors.
+        let n = 4096;
+        let sum = |f: &dyn Fn(u64) -> f32| (0..n).map(|i| f64::from(f(i))).sum::<f64>() / n as f64;
+        let bound = 5.0 / 12.0 / (n as f64).sqrt();
+        assert!(sum(&|i| (lens(0, i) - 0.5) * (lens(0, i + 1) - 0.5)).abs() < bound);
+        assert!(sum(&|i| (lens(0, i) - 0.5) * (lens(1, i) - 0.5)).abs() < bound);
     }
 }

@@ -6,10 +6,9 @@ use std::time::{Duration, Instant};
 
 use rayon::prelude::*;
 
-use super::gradient::Tracer;
 use super::gradient::shift::Shift;
-use super::{SampleId, sample};
-use crate::film::{Film, Needs, Rejected, Tile};
+use super::{SampleId, wave};
+use crate::film::{Film, Needs, Rejected, Sample, TILE, Tile};
 use crate::scene::Scene;
 
 /// How much to render.
@@ -139,23 +138,41 @@ fn run_wave(scene: &Scene, settings: Settings, control: &Control, outcome: &mut 
     outcome.first_rejected = first_rejected.into_inner().unwrap_or_else(|poisoned| poisoned.into_inner());
 }
 
-fn run_tile(scene: &Scene, settings: Settings, tile: &mut Tile, wave: Wave) -> Option<(SampleId, Rejected)> {
-    let Needs { occlusion, edges, ambient, .. } = settings.needs;
-    let mut tracer = edges.then(|| Tracer::new(settings.shift, ambient));
+fn run_tile(scene: &Scene, settings: Settings, tile: &mut Tile, counts: Wave) -> Option<(SampleId, Rejected)> {
+    let mut wave = wave::Wave::new(scene, settings.needs, settings.shift);
     let mut first_rejected = None;
     let at = |pixel: usize, tile: &Tile| (tile.x + pixel % tile.width, tile.y + pixel / tile.width);
-    let counts: Vec<u32> =
-        (0..tile.width * tile.height).map(|pixel| at(pixel, tile)).map(|(x, y)| wave(x, y)).collect();
-    for turn in 0..counts.iter().copied().max().unwrap_or(0) {
-        for pixel in (0..counts.len()).filter(|&pixel| turn < counts[pixel]) {
+    // Samples of one number are traced together, whatever number a pixel begins with.
+    let spans: Vec<_> = (0..tile.width * tile.height)
+        .map(|pixel| {
             let (x, y) = at(pixel, tile);
-            let id = SampleId { seed: settings.seed, x, y, index: settings.first + tile.count(pixel) };
-            if let Err(reason) = tile.add(pixel, &sample(scene, id, occlusion, tracer.as_mut())) {
-                first_rejected.get_or_insert((id, reason));
+            tile.count(pixel)..tile.count(pixel) + counts(x, y)
+        })
+        .collect();
+    let (start, end) = (spans.iter().map(|span| span.start).min(), spans.iter().map(|span| span.end).max());
+    let (mut numbers, mut pixels) = (Vec::new(), Vec::new());
+    for index in start.unwrap_or(0)..end.unwrap_or(0) {
+        numbers.clear();
+        numbers.extend((0..spans.len()).filter(|&pixel| spans[pixel].contains(&index)));
+        pixels.clear();
+        pixels.extend(numbers.iter().map(|&pixel| at(pixel, tile)));
+        let samples = wave.trace(settings.seed, settings.first + index, &pixels);
+        for ((&pixel, &(x, y)), sample) in numbers.iter().zip(&pixels).zip(samples) {
+            if let Err(reason) = tile.add(pixel, sample) {
+                first_rejected.get_or_insert((SampleId { seed: settings.seed, x, y, index: settings.first + index }, reason));
             }
         }
     }
     first_rejected
+}
+
+/// A single sample as it is taken in a render of the whole film, with all that can be recorded of it.
+pub fn sample(scene: &Scene, id: SampleId, shift: Shift) -> Sample {
+    let all = Needs { features: true, edges: true, bins: true, occlusion: true, position: true, ambient: true };
+    let (x, y) = (id.x / TILE * TILE, id.y / TILE * TILE);
+    let (width, height) = (TILE.min(scene.sensor().width - x), TILE.min(scene.sensor().height - y));
+    let pixels: Vec<_> = (0..width * height).map(|pixel| (x + pixel % width, y + pixel / width)).collect();
+    wave::Wave::new(scene, all, shift).trace(id.seed, id.index, &pixels)[(id.y - y) * width + id.x - x]
 }
 
 #[cfg(test)]

@@ -2,10 +2,12 @@
 
 use std::sync::Arc;
 
+use super::packet::Rays;
 use super::shape::{Bounds, Geometry};
 use super::{Group, Ray, Shape, Surface};
 use crate::error::Result;
-use crate::ffi::embree::{self, Committed, Device, Hit, SceneBuilder};
+use crate::ffi::embree::{self, Committed, Device, Hit, Hits, SceneBuilder};
+use crate::math::lanes::Mask;
 use crate::math::{Frame, Mat4, Vec3};
 
 /// A committed Embree scene. Its geometry numbers are those of the shapes that stand by themselves, then those of the
@@ -29,7 +31,7 @@ struct Placement {
 }
 
 /// Shadow rays end just before their target, in units of their length.
-const SHADOW_END: f32 = 1.0 - 1e-5;
+pub const SHADOW_END: f32 = 1.0 - 1e-5;
 
 impl Accel {
     /// Builds the hierarchy on `threads` threads (0: all). The shapes of the groups are numbered on after `shapes`.
@@ -65,6 +67,18 @@ impl Accel {
             direction: direction.to_array(),
             t_far,
         })
+    }
+
+    /// The first hits along the active rays. `coherent`: they start and run close together.
+    #[inline]
+    pub fn intersect_packet(&self, rays: &Rays, active: Mask, coherent: bool) -> Hits {
+        self.scene.intersect_packet(&rays.to_embree(active), coherent)
+    }
+
+    /// Which of the active rays meet anything.
+    #[inline]
+    pub fn occluded_packet(&self, rays: &Rays, active: Mask) -> Mask {
+        Mask(self.scene.occluded_packet(&rays.to_embree(active)))
     }
 
     /// The surface of a hit, of one of all shapes.

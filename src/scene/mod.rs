@@ -5,6 +5,7 @@ pub mod accel;
 pub mod bsdf;
 pub mod emitter;
 pub mod load;
+pub mod packet;
 pub mod sensor;
 pub mod shape;
 pub mod surface;
@@ -14,13 +15,13 @@ use std::sync::Arc;
 
 use self::accel::Accel;
 use self::bsdf::Bsdf;
-use self::emitter::{Emitter, LightPoint};
+use self::emitter::{Choice, Emitter, LightPoint};
+use self::packet::{Finish, Lamp};
 use self::sensor::Sensor;
 pub use self::shape::Bounds;
 use self::shape::Geometry;
 pub use self::surface::Surface;
 use crate::error::Result;
-use crate::math::discrete::Discrete;
 use crate::math::{Mat4, Rgb, Vec2, Vec3};
 
 /// A ray with a unit direction.
@@ -98,8 +99,11 @@ pub struct Scene {
     /// Those that stand by themselves, then those of the groups.
     shapes: Vec<Shape>,
     emitters: Vec<Box<dyn Emitter>>,
-    /// Chance of each emitter to be chosen; `None` when nothing emits.
-    emitter_choice: Option<Discrete>,
+    /// `None` when nothing emits.
+    emitter_choice: Option<Choice>,
+    /// What packets have to know of the shapes, and of the emitters.
+    finishes: Vec<Finish>,
+    lamps: Vec<Lamp>,
     environment: Option<u32>,
     sensor: Sensor,
     integrator: Integrator,
@@ -119,18 +123,23 @@ impl Scene {
             return Err(crate::error::Error::Usage(what.into()));
         }
         emitters.iter_mut().for_each(|emitter| emitter.enclose(accel.bounds()));
-        let emitter_choice = Self::choice(&emitters);
+        let emitter_choice = Choice::new(&emitters);
+        let chance = |index| emitter_choice.as_ref().and_then(|choice| choice.constant(index)).unwrap_or_default();
+        let lamps = emitters.iter().enumerate().map(|(i, emitter)| Lamp::new(&**emitter, chance(i))).collect();
+        let finishes = shapes.iter().map(Finish::new).collect();
         let environment = surrounding.first().copied();
-        Ok(Self { accel, shapes, emitters, emitter_choice, environment, sensor, integrator, fingerprint })
-    }
-
-    /// Half of the choices go by power and half are even, so that a weak emitter close by is not starved.
-    fn choice(emitters: &[Box<dyn Emitter>]) -> Option<Discrete> {
-        let powers: Vec<f32> = emitters.iter().map(|emitter| emitter.power()).collect();
-        let total: f32 = powers.iter().sum();
-        let lit = powers.iter().filter(|&&power| power > 0.0).count() as f32;
-        let share = |power: f32| if power > 0.0 { 0.5 / lit + 0.5 * (power / total) } else { 0.0 };
-        Discrete::new(powers.into_iter().map(share))
+        Ok(Self {
+            accel,
+            shapes,
+            emitters,
+            emitter_choice,
+            finishes,
+            lamps,
+            environment,
+            sensor,
+            integrator,
+            fingerprint,
+        })
     }
 
     /// The first surface along a ray.
@@ -190,18 +199,17 @@ impl Scene {
 
     /// A point on an emitter, with its density per solid angle at `from` including the choice of emitter.
     pub fn sample_emitter(&self, from: &Surface, choice: f32, u: Vec2) -> Option<(LightPoint, f32)> {
-        let table = self.emitter_choice.as_ref()?;
-        let (index, _) = table.sample(choice);
+        let (index, chance) = self.emitter_choice.as_ref()?.choose(from.p, choice);
         let emitter = &self.emitters[index];
         let mut point = emitter.sample(from.p, u)?;
         point.emitter = index as u32;
-        let pdf = emitter.pdf(from.p, &point) * table.probability(index);
+        let pdf = emitter.pdf(from.p, &point) * chance;
         (pdf > 0.0).then_some((point, pdf))
     }
 
     /// Density with which [`Scene::sample_emitter`] finds `point` from `from`.
     pub fn emitter_pdf(&self, from: Vec3, point: &LightPoint) -> f32 {
-        let chance = self.emitter_choice.as_ref().map_or(0.0, |table| table.probability(point.emitter as usize));
+        let chance = self.emitter_choice.as_ref().map_or(0.0, |choice| choice.probability(from, point.emitter as usize));
         if chance > 0.0 { chance * self.emitters[point.emitter as usize].pdf(from, point) } else { 0.0 }
     }
 

@@ -27,7 +27,7 @@ pub struct Surface {
 /// Distance at which rays start off a surface, per size of coordinate. Far more than rounding asks for: scenes
 /// are modelled with doubled and nearly coincident surfaces, and look right only in renderers that skip the
 /// second one, as Mitsuba does at this distance.
-const RAY_EPSILON: f32 = 1500.0 * 0.5 * f32::EPSILON;
+pub const RAY_EPSILON: f32 = 1500.0 * 0.5 * f32::EPSILON;
 
 /// How far off `p` rays start, in a scene of the given size. Where coordinates are small a length of one counts,
 /// or the scene's own size when that is smaller.

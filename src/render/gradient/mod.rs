@@ -1,55 +1,95 @@
 //! Gradient-domain path tracing: see the README beside this file for the estimator.
 
-mod base_path;
+mod offsets;
 pub mod shift;
+mod states;
 
-use self::base_path::BasePath;
+use self::offsets::{NOTHING, OUTSIDE, Offsets};
 use self::shift::{Shift, Walk};
-use super::{SampleId, Sampler, View, path};
-use crate::film::{EDGES, Sample};
+use self::states::{Level, Prefix};
+use super::wave::{Traced, Views};
+use crate::film::EDGES;
+use crate::math::Rgb;
+use crate::math::lanes::LANES;
 use crate::scene::Scene;
 
-/// Traces samples with their differences to the neighbours; keeps its buffers between samples.
-pub struct Tracer {
-    base: BasePath,
+/// Shifts the paths of waves to their neighbours; keeps its room between them.
+pub struct Gradient {
     shift: Shift,
     ambient: bool,
+    offsets: Offsets,
+    states: Level,
+    next: Level,
 }
 
-impl Tracer {
+impl Gradient {
     /// Differences by a shift, also those that an ambient light would make if asked for.
     pub fn new(shift: Shift, ambient: bool) -> Self {
-        Self { base: BasePath::default(), shift, ambient }
+        Self { shift, ambient, offsets: Offsets::default(), states: Level::default(), next: Level::default() }
     }
 
-    /// The path tracer's sample, bit for bit, with this pixel's end of each edge.
-    pub fn sample(&mut self, scene: &Scene, sampler: &Sampler, view: View, id: SampleId) -> Sample {
-        self.base.clear();
-        let mut sample = path::trace(scene, sampler, view, &mut self.base);
-        // The other ends of the edges account for what copies of a dark path would carry; replays are no copies.
-        if self.shift != Shift::Replay && !self.ambient && self.base.is_dark() {
-            return sample;
+    /// Whether paths must be recorded to be shifted; they are replayed otherwise.
+    pub fn needs_vertices(&self) -> bool {
+        self.shift != Shift::Replay
+    }
+
+    /// Adds this end of each edge to the samples.
+    pub fn shift(&mut self, scene: &Scene, views: &Views, traced: &mut Traced) {
+        let Shift::Reconnect { threshold } = self.shift else { return };
+        let Traced { levels, packets: counts, samples, reach, .. } = traced;
+        let packets = views.pixels.len().div_ceil(LANES);
+        if self.ambient {
+            reach.fill(u32::MAX);
         }
-        let size = (scene.sensor().width as i64, scene.sensor().height as i64);
-        let (color, of_ambient) = (sample.color, sample.ambient.color);
-        for ((edge, ambient), step) in sample.edges.iter_mut().zip(&mut sample.ambient.edges).zip(EDGES) {
-            let (x, y) = (id.x as i64 + i64::from(step.0), id.y as i64 + i64::from(step.1));
-            if x < 0 || y < 0 || x >= size.0 || y >= size.1 {
-                continue;
+        self.offsets.start(scene, views, &levels[0][..packets]);
+        self.start(packets, reach);
+        for (k, &count) in counts.iter().enumerate() {
+            let below = counts.get(k + 1).map_or(&[][..], |&packets| &levels[k + 1][..packets]);
+            self.next.reset(below.len());
+            let walk = Walk { scene, threshold, ambient: self.ambient, base: &levels[0][..packets], below };
+            for packet in 0..count {
+                let vertices = &levels[k][packet];
+                // The other ends of the edges account for what copies of a dark path would carry.
+                let mut lit = vertices.met;
+                vertices.met.lanes().for_each(|lane| lit.set(lane, reach[vertices.id.0[lane] as usize] > k as u32));
+                if !lit.any() {
+                    continue;
+                }
+                let apart = self.states.apart(packet);
+                let onward = walk.onward(vertices, lit, apart, |id| reach[id as usize] > k as u32 + 1);
+                for edge in 0..EDGES.len() {
+                    let states = self.states.get(packet, edge);
+                    let difference = walk.step(vertices, &onward, lit, states, (&mut self.next, edge), &mut self.offsets);
+                    let inside = lit & states.0.inside;
+                    for lane in inside.lanes() {
+                        let sample = &mut samples[vertices.id.0[lane] as usize];
+                        sample.edges[edge] += difference.light.get(lane);
+                        if self.ambient {
+                            sample.ambient.edges[edge] += difference.ambient.get(lane);
+                        }
+                    }
+                }
             }
-            let neighbour = view.moved(step);
-            (*edge, *ambient) = match self.shift {
-                Shift::Reconnect { threshold } => {
-                    let walk = Walk::new(scene, threshold, self.ambient);
-                    walk.along(&self.base, neighbour.ray(scene))
-                }
-                // Both ends sample every pair of paths of the same numbers: each counts half.
-                Shift::Replay => {
-                    let there = path::trace(scene, sampler, neighbour, &mut ());
-                    (0.5 * (there.color - color), 0.5 * (there.ambient.color - of_ambient))
-                }
-            };
+            std::mem::swap(&mut self.states, &mut self.next);
         }
-        sample
+    }
+
+    /// Offsets of lit paths begin apart, where the camera sees anything.
+    fn start(&mut self, packets: usize, reach: &[u32]) {
+        self.states.reset(packets);
+        let start = Prefix { throughput: Rgb::ONE, ratio: 1.0 };
+        for (sample, _) in reach.iter().enumerate().filter(|(_, reach)| **reach > 0) {
+            for edge in 0..EDGES.len() {
+                let place = self.offsets.first(sample, edge);
+                let (states, lane) = self.states.at(sample as u32, edge);
+                for states in states {
+                    match place {
+                        OUTSIDE => {}
+                        NOTHING => states.fail(lane),
+                        place => states.part(lane, start, place),
+                    }
+                }
+            }
+        }
     }
 }

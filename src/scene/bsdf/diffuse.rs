@@ -3,7 +3,7 @@
 use std::f32::consts::FRAC_1_PI;
 use std::sync::Arc;
 
-use super::{Bsdf, BsdfSample, Eval, Lobe};
+use super::{Bsdf, BsdfSample, Eval, Lambert, Lobe};
 use crate::error::Result;
 use crate::math::{Rgb, Vec2, Vec3, warp};
 use crate::scene::Surface;
@@ -43,6 +43,10 @@ impl Bsdf for Diffuse {
         }
         let value = self.reflectance.color(&surface.at) * (FRAC_1_PI * wo.z);
         Eval { value, pdf: warp::cosine_hemisphere_pdf(wo.z) }
+    }
+
+    fn lambert(&self) -> Option<Lambert> {
+        Some(Lambert { reflectance: Arc::clone(&self.reflectance), two_sided: false })
     }
 
     fn roughness(&self, _surface: &Surface) -> Option<f32> {

@@ -25,6 +25,7 @@ use std::sync::Arc;
 use super::Surface;
 use super::load::Plugin;
 use super::load::props::{Object, Property, Value};
+use super::texture::Texture;
 use crate::error::Result;
 use crate::math::{Rgb, Vec2, Vec3, vec3};
 
@@ -108,6 +109,14 @@ pub struct Delta {
     pub probability: f32,
 }
 
+/// A material that is diffuse and nothing else.
+pub struct Lambert {
+    /// Its reflectance.
+    pub reflectance: Arc<dyn Texture>,
+    /// Whether it looks the same from behind.
+    pub two_sided: bool,
+}
+
 /// Scattering at a surface.
 pub trait Bsdf: Send + Sync {
     /// Draws a direction from the lobe number `lobe` in [0, 1) and `u`. `None` absorbs.
@@ -135,6 +144,11 @@ pub trait Bsdf: Send + Sync {
 
     /// Interior over exterior index of refraction of the smooth lobes that refract, if there are such.
     fn refraction(&self) -> Option<f32> {
+        None
+    }
+
+    /// The material, if it is diffuse and nothing else.
+    fn lambert(&self) -> Option<Lambert> {
         None
     }
 

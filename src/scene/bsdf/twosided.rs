@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Bsdf, BsdfSample, Delta, Eval, Lobe, mirror};
+use super::{Bsdf, BsdfSample, Delta, Eval, Lambert, Lobe, mirror};
 use crate::error::Result;
 use crate::math::{Rgb, Vec2, Vec3};
 use crate::scene::Surface;
@@ -66,6 +66,11 @@ impl Bsdf for TwoSided {
 
     fn albedo(&self, surface: &Surface) -> Rgb {
         self.side(surface.wi).albedo(surface)
+    }
+
+    fn lambert(&self) -> Option<Lambert> {
+        let same = Arc::ptr_eq(&self.front, &self.back);
+        self.front.lambert().filter(|_| same).map(|lambert| Lambert { two_sided: true, ..lambert })
     }
 
     fn needs_derivatives(&self) -> bool {

@@ -44,6 +44,10 @@ impl Emitter for Area {
         PI * self.geometry.area() * self.radiance.mean().max(0.0)
     }
 
+    fn even(&self) -> Option<(&Arc<Geometry>, Rgb)> {
+        Some((&self.geometry, self.radiance.constant()?))
+    }
+
     fn name(&self) -> &'static str {
         "area"
     }

@@ -2,6 +2,7 @@
 //! radiance a point sends: three functions of the point, so that any point can be looked at from anywhere.
 
 mod area;
+mod choice;
 mod constant;
 mod directional;
 mod envmap;
@@ -9,9 +10,12 @@ mod point;
 mod spot;
 
 pub use self::area::Area;
+pub use self::choice::Choice;
 use super::load::Plugin;
+use super::shape::Geometry;
 use super::{Bounds, Surface, texture};
 use crate::math::{Rgb, Vec2, Vec3};
+use std::sync::Arc;
 
 /// The emitters that stand by themselves in scene files. (`area` stands in a shape.)
 pub const PLUGINS: &[Plugin<Box<dyn Emitter>>] =
@@ -132,6 +136,11 @@ pub trait Emitter: Send + Sync {
     /// Whether rays that meet nothing end on it.
     fn is_environment(&self) -> bool {
         false
+    }
+
+    /// The shape and its radiance, of one that sends the same from everywhere on its outside.
+    fn even(&self) -> Option<(&Arc<Geometry>, Rgb)> {
+        None
     }
 
     /// The plugin's name.

@@ -4,10 +4,12 @@ mod film;
 
 use self::film::Film;
 use crate::error::Result;
-use crate::math::{Mat4, Vec2, Vec3, vec2, warp};
+use crate::math::lanes::{Lanes, Lanes3};
+use crate::math::{Mat4, Vec2, Vec3, Vec4, vec2};
 use crate::scene::Ray;
 use crate::scene::load::Loader;
 use crate::scene::load::props::Object;
+use crate::scene::packet::{self, Rays};
 
 /// Looks along its local +z with +x to the left and +y up.
 #[derive(Clone, Debug)]
@@ -165,23 +167,48 @@ impl Sensor {
     /// The ray through a film position in pixels, (0, 0) being the upper left corner of the image, and through a
     /// point of the lens in [0, 1)². It runs from the near to the far clip plane.
     pub fn ray(&self, film: Vec2, lens: Vec2) -> Ray {
-        let at = self.film.place(film / vec2(self.width as f32, self.height as f32)) + self.principal_point;
-        let at = (Vec2::ONE - 2.0 * at) * self.half_extent;
-        let (origin, direction) = match self.projection {
-            Projection::Pinhole => (Vec3::ZERO, at.extend(1.0)),
-            Projection::Lens { radius, focus } => {
-                let origin = (radius * warp::disk(lens)).extend(0.0);
-                (origin, at.extend(1.0) * focus - origin)
-            }
-            Projection::Parallel => (at.extend(0.0), Vec3::Z),
-        };
-        let local = direction.normalize();
-        let origin = self.to_world.transform_point3(origin);
-        let along = self.to_world.transform_vector3(local);
-        // Planes are at depths along z; a scaled camera has its planes scaled.
-        let (scale, direction) = (along.length(), along.normalize());
-        let distance = |depth: f32| depth / local.z * scale;
-        let start = origin + direction * distance(self.near);
-        Ray { origin: start, direction, t_far: distance(self.far - self.near) }
+        self.rays([film.x, film.y].map(Lanes::splat), [lens.x, lens.y].map(Lanes::splat)).get(0)
     }
+
+    /// [`Sensor::ray`] for sixteen film positions.
+    pub fn rays(&self, film: [Lanes; 2], lens: [Lanes; 2]) -> Rays {
+        view(self, film, lens)
+    }
+
+    /// Whether the lens has an extent, so that pixels differ by their positions on it, too.
+    pub fn has_lens(&self) -> bool {
+        matches!(self.projection, Projection::Lens { .. })
+    }
+}
+
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
+fn view(sensor: &Sensor, [x, y]: [Lanes; 2], [lens_u, lens_v]: [Lanes; 2]) -> Rays {
+    // Window to film and film to the plane at distance one are one scale and one shift together.
+    let (start, end) = (sensor.film.place(Vec2::ZERO), sensor.film.place(Vec2::ONE));
+    let scale = -2.0 * (end - start) * sensor.half_extent / vec2(sensor.width as f32, sensor.height as f32);
+    let shift = (Vec2::ONE - 2.0 * (start + sensor.principal_point)) * sensor.half_extent;
+    let along = |at: Lanes, scale: f32, shift: f32| at * Lanes::splat(scale) + Lanes::splat(shift);
+    let (x, y) = (along(x, scale.x, shift.x), along(y, scale.y, shift.y));
+    let one = Lanes::splat(1.0);
+    let (origin, direction) = match sensor.projection {
+        Projection::Pinhole => (Lanes3::ZERO, Lanes3 { x, y, z: one }),
+        Projection::Lens { radius, focus } => {
+            let (u, v) = packet::disk(lens_u, lens_v);
+            let origin = Lanes3 { x: u, y: v, z: Lanes::ZERO } * Lanes::splat(radius);
+            (origin, Lanes3 { x, y, z: one } * Lanes::splat(focus) - origin)
+        }
+        Projection::Parallel => (Lanes3 { x, y, z: Lanes::ZERO }, Lanes3::splat(Vec3::Z)),
+    };
+    let axis = |column: Vec4| Lanes3::splat(column.truncate());
+    let [right, up, forward, position] =
+        [sensor.to_world.x_axis, sensor.to_world.y_axis, sensor.to_world.z_axis, sensor.to_world.w_axis].map(axis);
+    let to_world = |v: Lanes3| right * v.x + up * v.y + forward * v.z;
+    let local = direction.normalize_or(Lanes3::splat(Vec3::Z));
+    let along = to_world(local);
+    // Planes are at depths along z; a scaled camera has its planes scaled.
+    let length = along.dot(along).sqrt();
+    let direction = along * (one / length);
+    let distance = |depth: f32| Lanes::splat(depth) / local.z * length;
+    let origin = to_world(origin) + position + direction * distance(sensor.near);
+    Rays { origin, direction, t_far: distance(sensor.far - sensor.near) }
 }

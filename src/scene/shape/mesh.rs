@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::Bounds;
 use crate::ffi::embree::{Hit, PaddedVertices};
-use crate::math::discrete::Discrete;
+use crate::math::alias::Alias;
 use crate::math::{Frame, Mat4, Rgb, Vec2, Vec3, vec2, warp};
 use crate::scene::emitter::{LightPoint, Position};
 use crate::scene::load::MeshData;
@@ -16,17 +16,27 @@ pub struct Mesh {
     pub positions: Arc<PaddedVertices>,
     /// Vertex numbers.
     pub triangles: Arc<Vec<[u32; 3]>>,
-    /// Unit normals, or none for flat shading.
-    normals: Vec<Vec3>,
+    /// What a hit needs of each triangle, in one place of memory.
+    corners: Vec<Corners>,
     /// Texture coordinates, or none for barycentric ones.
     uvs: Vec<Vec2>,
     /// Values by name: one a vertex under `vertex_...`, one a triangle under `face_...`.
     attributes: Vec<(String, Vec<Rgb>)>,
     /// -1 to turn the surface inside out.
     side: f32,
-    /// Triangles by area.
-    areas: Option<Discrete>,
+    /// Triangles by area, for those that glow.
+    areas: Option<Alias>,
+    area: f32,
     bounds: Bounds,
+}
+
+/// The corners of a triangle.
+#[derive(Clone, Copy, Debug)]
+pub struct Corners {
+    /// Positions.
+    pub p: [Vec3; 3],
+    /// Normals, zero for flat shading.
+    pub n: [Vec3; 3],
 }
 
 /// How a mesh is placed and shaded.
@@ -61,35 +71,45 @@ impl Mesh {
             let matrix = to_world.inverse().transpose();
             data.normals.iter().map(|&n| matrix.transform_vector3(n).normalize_or_zero()).collect()
         };
-        let area = |t: &[u32; 3]| {
-            let [a, b, c] = t.map(|i| positions[i as usize]);
-            0.5 * (b - a).cross(c - a).length()
-        };
-        let areas = Discrete::new(triangles.iter().map(area));
+        let corners: Vec<_> = triangles
+            .iter()
+            .map(|triangle| Corners {
+                p: triangle.map(|i| positions[i as usize]),
+                n: triangle.map(|i| normals.get(i as usize).copied().unwrap_or_default()),
+            })
+            .collect();
+        let area = |&Corners { p: [a, b, c], .. }: &Corners| 0.5 * (b - a).cross(c - a).length();
+        let areas: Vec<f32> = corners.iter().map(area).collect();
         let bounds = Bounds::of(triangles.iter().flatten().map(|&i| positions[i as usize]));
         Self {
             positions: Arc::new(PaddedVertices::new(positions.iter().map(|p| p.to_array()))),
             triangles: Arc::new(triangles),
-            normals,
+            corners,
             uvs: data.uvs,
             attributes,
             side: if flip_normals { -1.0 } else { 1.0 },
-            areas,
+            area: areas.iter().map(|&area| f64::from(area)).sum::<f64>() as f32,
+            areas: Alias::new(&areas),
             bounds,
         }
     }
 
-    fn corners(&self, triangle: [u32; 3]) -> [Vec3; 3] {
-        triangle.map(|index| Vec3::from_array(self.positions.get(index)))
+    /// The corners of a triangle.
+    #[inline]
+    pub fn corners(&self, triangle: u32) -> &Corners {
+        &self.corners[triangle as usize]
+    }
+
+    /// 1, or -1 when the surface is inside out.
+    #[inline]
+    pub fn side(&self) -> f32 {
+        self.side
     }
 
     /// Geometric and shading normal at barycentric coordinates, the first turned to the side of the second.
-    fn normals_at(&self, triangle: [u32; 3], [a, b, c]: [Vec3; 3], weights: [f32; 3]) -> (Vec3, Vec3) {
+    fn normals_at(&self, &Corners { p: [a, b, c], n }: &Corners, weights: [f32; 3]) -> (Vec3, Vec3) {
         let flat = (b - a).cross(c - a).normalize_or(Vec3::Z) * self.side;
-        if self.normals.is_empty() {
-            return (flat, flat);
-        }
-        let smooth: Vec3 = (0..3).map(|k| self.normals[triangle[k] as usize] * weights[k]).sum();
+        let smooth = n[0] * weights[0] + n[1] * weights[1] + n[2] * weights[2];
         match smooth.try_normalize() {
             Some(smooth) => {
                 let smooth = smooth * self.side;
@@ -100,28 +120,30 @@ impl Mesh {
     }
 
     fn texture_point(&self, primitive: u32, weights: [f32; 3]) -> texture::Point {
-        let uv = self.uv_at(self.triangles[primitive as usize], weights);
+        let uv = self.uv_at(primitive, weights);
         texture::Point { uv, barycentric: vec2(weights[1], weights[2]), primitive, shape: 0 }
     }
 
-    fn uv_at(&self, triangle: [u32; 3], weights: [f32; 3]) -> Vec2 {
+    /// Texture coordinates at barycentric ones.
+    #[inline]
+    pub fn uv_at(&self, triangle: u32, weights: [f32; 3]) -> Vec2 {
         if self.uvs.is_empty() {
             return vec2(weights[1], weights[2]);
         }
-        (0..3).map(|k| self.uvs[triangle[k] as usize] * weights[k]).sum()
+        let [a, b, c] = self.triangles[triangle as usize].map(|index| self.uvs[index as usize]);
+        a * weights[0] + b * weights[1] + c * weights[2]
     }
 
     /// What a ray has hit.
     #[inline]
     pub fn surface(&self, hit: &Hit, ray: Ray, derivatives: bool) -> Surface {
-        let triangle = self.triangles[hit.primitive as usize];
-        let corners = self.corners(triangle);
+        let corners = self.corners(hit.primitive);
         let weights = [1.0 - hit.u - hit.v, hit.u, hit.v];
-        let p = corners[0] * weights[0] + corners[1] * weights[1] + corners[2] * weights[2];
-        let (n, shading) = self.normals_at(triangle, corners, weights);
+        let p = corners.p[0] * weights[0] + corners.p[1] * weights[1] + corners.p[2] * weights[2];
+        let (n, shading) = self.normals_at(corners, weights);
         let (mut dp_du, mut dp_dv) = (Vec3::ZERO, Vec3::ZERO);
         let frame = if derivatives {
-            (dp_du, dp_dv) = self.derivatives(triangle, corners, n);
+            (dp_du, dp_dv) = self.derivatives(hit.primitive, n);
             Frame::along(shading, dp_du)
         } else {
             Frame::around(shading)
@@ -138,9 +160,10 @@ impl Mesh {
         }
     }
 
-    fn derivatives(&self, triangle: [u32; 3], [a, b, c]: [Vec3; 3], n: Vec3) -> (Vec3, Vec3) {
+    fn derivatives(&self, triangle: u32, n: Vec3) -> (Vec3, Vec3) {
         if !self.uvs.is_empty() {
-            let [ua, ub, uc] = triangle.map(|index| self.uvs[index as usize]);
+            let [a, b, c] = self.corners(triangle).p;
+            let [ua, ub, uc] = self.triangles[triangle as usize].map(|index| self.uvs[index as usize]);
             let (d0, d1, e0, e1) = (ub - ua, uc - ua, b - a, c - a);
             let determinant = d0.perp_dot(d1);
             if determinant != 0.0 {
@@ -168,7 +191,7 @@ impl Mesh {
 
     /// Total area.
     pub fn area(&self) -> f32 {
-        self.areas.as_ref().map_or(0.0, |areas| areas.total() as f32)
+        self.area
     }
 
     /// Box around all triangles.
@@ -178,15 +201,21 @@ impl Mesh {
 
     /// A point uniform over the area.
     pub fn sample(&self, u: Vec2) -> Option<LightPoint> {
-        let (index, rest) = self.areas.as_ref()?.sample(u.y);
-        let triangle = self.triangles[index];
-        let corners = self.corners(triangle);
+        let (index, rest) = self.triangle(u.y)?;
+        let corners = self.corners(index);
         let b = warp::triangle(vec2(u.x, rest));
         let weights = [1.0 - b.x - b.y, b.x, b.y];
-        let p = corners[0] * weights[0] + corners[1] * weights[1] + corners[2] * weights[2];
-        let (n, _) = self.normals_at(triangle, corners, weights);
+        let p = corners.p[0] * weights[0] + corners.p[1] * weights[1] + corners.p[2] * weights[2];
+        let (n, _) = self.normals_at(corners, weights);
         let position = Position::Surface { p, n };
-        Some(LightPoint::drawn(position, self.texture_point(index as u32, weights)))
+        Some(LightPoint::drawn(position, self.texture_point(index, weights)))
+    }
+
+    /// The triangle that `u` falls on when they are laid side by side by area, and `u` stretched over it.
+    #[inline]
+    pub fn triangle(&self, u: f32) -> Option<(u32, f32)> {
+        let (index, rest) = self.areas.as_ref()?.sample(u);
+        Some((index as u32, rest))
     }
 
     /// Density of [`Mesh::sample`] per solid angle at `from`.

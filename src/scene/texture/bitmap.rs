@@ -37,8 +37,13 @@ enum Wrap {
 }
 
 impl Wrap {
+    #[inline]
     fn apply(self, index: i64, size: usize) -> usize {
         let n = size as i64;
+        // Divisions are slow, and few points are outside.
+        if (0..n).contains(&index) {
+            return index as usize;
+        }
         let wrapped = match self {
             Self::Repeat => index.rem_euclid(n),
             Self::Mirror => {
@@ -73,6 +78,7 @@ impl Bitmap {
         self.texels.texel(x, y, self.raw)
     }
 
+    #[inline]
     fn resolution(&self) -> Vec2 {
         vec2(self.texels.width as f32, self.texels.height as f32)
     }
@@ -81,8 +87,10 @@ impl Bitmap {
         let at = self.to_uv.apply(point.uv) * self.resolution() - 0.5;
         let corner = at.floor();
         let (x, y) = (corner.x as i64, corner.y as i64);
-        let texels =
-            [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(dx, dy)| self.fetch(x.saturating_add(dx), y.saturating_add(dy)));
+        let wrap = |index: i64, size| [index, index.saturating_add(1)].map(|index| self.wrap.apply(index, size));
+        let ([left, right], [above, below]) = (wrap(x, self.texels.width), wrap(y, self.texels.height));
+        let texel = |x, y| self.texels.texel(x, y, self.raw);
+        let texels = [texel(left, above), texel(right, above), texel(left, below), texel(right, below)];
         Footprint { texels, fraction: at - corner }
     }
 

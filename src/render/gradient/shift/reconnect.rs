@@ -1,71 +1,96 @@
 //! Joining the base path at its next vertex. Jacobians are in solid angle at the vertex that is left, so they are
 //! the ratio of the solid angles under which the two paths see the same piece of surface.
 
-use super::End;
-use crate::math::{Rgb, Vec3};
-use crate::scene::emitter::LightPoint;
-use crate::scene::{Scene, Surface};
+use super::super::offsets::Packet;
+use crate::math::lanes::{Lanes, Lanes3, Mask};
+use crate::scene::packet::{Lights, Surfaces};
+use crate::scene::Scene;
 
 /// A Jacobian beyond this, or below its inverse, is a geometry that floats cannot hold; the shift then fails in
 /// both directions.
 const MAX_JACOBIAN: f32 = 1e6;
 
-fn in_range(jacobian: f32) -> bool {
-    jacobian < MAX_JACOBIAN && jacobian > 1.0 / MAX_JACOBIAN
+#[inline(always)]
+fn in_range(jacobian: Lanes) -> Mask {
+    jacobian.less(Lanes::splat(MAX_JACOBIAN)) & jacobian.greater(Lanes::splat(1.0 / MAX_JACOBIAN))
 }
 
-/// A segment from the offset's vertex to the base path's next surface.
-pub struct Connection {
-    /// f cos at the offset's vertex.
-    pub value: Rgb,
-    /// Density per solid angle of scattering there.
-    pub pdf: f32,
-    /// dω' / dω.
-    pub jacobian: f32,
+/// Segments from offsets' vertices to base paths' next surfaces.
+pub struct Connections {
+    /// Which are possible; the others carry nothing.
+    pub possible: Mask,
+    /// f cos at the offset's vertex, times dω' / dω.
+    pub value: Lanes3,
+    /// Density per solid angle of scattering there, times dω' / dω.
+    pub pdf: Lanes,
     /// Local direction from the base path's next surface back to the offset's vertex.
-    pub wi: Vec3,
+    pub wi: Lanes3,
 }
 
-impl Connection {
-    /// From `offset` to `target`, which the base path reaches from `base`. `None` when it is blocked or carries
-    /// nothing.
-    pub fn new(scene: &Scene, base: &Surface, offset: &Surface, target: &Surface) -> Option<Self> {
-        let jacobian = jacobian(base.p, offset.p, target);
-        let direction = (target.p - offset.p).normalize_or_zero();
-        let eval = scene.bsdf(offset).eval(offset, offset.wi, offset.to_local(direction));
-        if !in_range(jacobian) || eval.value == Rgb::ZERO || !scene.mutually_visible(offset, target) {
-            return None;
-        }
-        Some(Self { value: eval.value, pdf: eval.pdf, jacobian, wi: target.to_local(-direction) })
+impl Connections {
+    /// From `offset` to `target`, which the base paths reach from `base`, of the active ones.
+    #[inline(always)]
+    pub fn new(scene: &Scene, base: Lanes3, offset: &Packet, target: &Surfaces, active: Mask) -> Self {
+        let Packet { surfaces, materials } = offset;
+        let jacobian = jacobian(base, surfaces.p, (target.p, target.n));
+        let direction = (target.p - surfaces.p).normalize_or(Lanes3::ZERO);
+        let in_range = active & in_range(jacobian);
+        let evals = materials.eval(scene, surfaces, (surfaces.wi, surfaces.frame.to_local(direction)), in_range);
+        let carried = in_range & evals.value.nonzero();
+        let possible = if carried.any() { scene.mutually_visible_packet(surfaces, target, carried) } else { carried };
+        let wi = target.frame.to_local(-direction);
+        Self { possible, value: evals.value * jacobian, pdf: evals.pdf * jacobian, wi }
     }
 }
 
-/// Solid angle of a piece of `target` seen from `offset`, over that seen from `base`.
-pub fn jacobian(base: Vec3, offset: Vec3, target: &Surface) -> f32 {
-    let solid_angle = |from: Vec3| {
-        let to = from - target.p;
-        let distance_squared = to.length_squared();
-        target.n.dot(to).abs() / (distance_squared * distance_squared.sqrt())
+/// Solid angles of pieces of surfaces, given by points and normals, seen from `offset`, over those seen from `base`.
+#[inline(always)]
+pub fn jacobian(base: Lanes3, offset: Lanes3, (p, n): (Lanes3, Lanes3)) -> Lanes {
+    let solid_angle = |from: Lanes3| {
+        let to = from - p;
+        let distance_squared = to.dot(to);
+        n.dot(to).abs() / (distance_squared * distance_squared.sqrt())
     };
     solid_angle(offset) / solid_angle(base)
 }
 
-/// From `offset` to the point that lights `base`. `None` when it is blocked or carries nothing.
-pub fn to_light(scene: &Scene, base: &Surface, offset: &Surface, point: &LightPoint) -> Option<End> {
-    let jacobian = point.solid_angle(offset.p) / point.solid_angle(base.p);
-    let direction = point.direction(offset.p);
-    let eval = scene.bsdf(offset).eval(offset, offset.wi, offset.to_local(direction));
-    let radiance = scene.radiance(point, -direction);
-    if !in_range(jacobian) || eval.value * radiance == Rgb::ZERO || !scene.visible(offset, point) {
-        return None;
-    }
-    let light_pdf = scene.emitter_pdf(offset.p, point);
-    Some(End { value: eval.value, pdf: point.scatter_pdf(eval.pdf), light_pdf, radiance, jacobian })
+/// What offsets receive over last segments of their own.
+#[derive(Clone, Copy)]
+pub struct Ends {
+    /// f cos at the offset's vertex times the radiance received, times dω' / dω; zero where nothing comes.
+    pub value: Lanes3,
+    /// Densities of choosing the point and of running into it, times dω' / dω.
+    pub density: Lanes,
 }
 
-/// From `offset` the way that `base` is left by, to an ambient light that nothing blocks. `None` when it carries nothing.
-pub fn to_ambient(scene: &Scene, base: &Surface, wo: Vec3, offset: &Surface) -> Option<End> {
-    let eval = scene.bsdf(offset).eval(offset, offset.wi, offset.to_local(base.frame.to_world(wo)));
-    let end = End { value: eval.value, pdf: eval.pdf, light_pdf: 0.0, radiance: Rgb::ONE, jacobian: 1.0 };
-    (eval.value != Rgb::ZERO).then_some(end)
+impl Ends {
+    /// Nothing is received.
+    pub const NONE: Self = Self { value: Lanes3::ZERO, density: Lanes::ZERO };
+
+    /// From `offset` to the points that light `base`, of the active ones.
+    #[inline(always)]
+    pub fn to_lights(scene: &Scene, base: Lanes3, offset: &Packet, lights: &Lights, active: Mask) -> Self {
+        let Packet { surfaces, materials } = offset;
+        let (direction, angle) = lights.seen_from(surfaces.p);
+        let (_, base_angle) = lights.seen_from(base);
+        let jacobian = angle / base_angle;
+        let in_range = active & in_range(jacobian);
+        let evals = materials.eval(scene, surfaces, (surfaces.wi, surfaces.frame.to_local(direction)), in_range);
+        let radiance = scene.light_radiance(lights, direction, in_range & evals.value.nonzero());
+        let value = evals.value.scale(radiance);
+        let carried = in_range & value.nonzero();
+        let lit = if carried.any() { scene.visible_packet(surfaces, lights, carried) } else { carried };
+        let density = scene.light_pdf(lights, (surfaces.p, angle), lit) + lights.scatter_pdf(evals.pdf);
+        Self {
+            value: lit.select3(value * jacobian, Lanes3::ZERO),
+            density: lit.select(density * jacobian, Lanes::ZERO),
+        }
+    }
+
+    /// Replaces one of them by what a single offset receives.
+    pub fn set(&mut self, lane: usize, end: Option<super::End>) {
+        let Some(end) = end else { return };
+        self.value.set(lane, end.value * end.radiance * end.jacobian);
+        self.density.0[lane] = (end.light_pdf + end.pdf) * end.jacobian;
+    }
 }

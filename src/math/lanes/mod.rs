@@ -1,7 +1,13 @@
 //! Sixteen floats that are worked on together. Written so that compilers turn every operation into vector
 //! instructions of whatever width the function around it is compiled for; the bits are the same for all of them.
 
-use std::ops::{Add, AddAssign, Div, Mul, Sub};
+mod bits;
+mod vector;
+
+use std::ops::{Add, AddAssign, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
+
+pub use self::bits::Bits;
+pub use self::vector::Lanes3;
 
 /// Number of floats.
 pub const LANES: usize = 16;
@@ -51,6 +57,34 @@ impl Lanes {
             *a = f(*a, b);
         }
         Self(out)
+    }
+
+    /// Where these are smaller than others.
+    #[inline(always)]
+    pub fn less(self, other: Self) -> Mask {
+        let mut out = [0; LANES];
+        for (i, lane) in out.iter_mut().enumerate() {
+            *lane = if self.0[i] < other.0[i] { !0 } else { 0 };
+        }
+        Mask(out)
+    }
+
+    /// Where these are larger than others.
+    #[inline(always)]
+    pub fn greater(self, other: Self) -> Mask {
+        other.less(self)
+    }
+
+    /// Absolute values.
+    #[inline(always)]
+    pub fn abs(self) -> Self {
+        self.map(f32::abs)
+    }
+
+    /// The absolute values with the signs of others.
+    #[inline(always)]
+    pub fn copysign(self, sign: Self) -> Self {
+        self.zip(sign, f32::copysign)
     }
 
     /// The smaller ones; those of `other` where this is NaN.
@@ -125,10 +159,114 @@ operator!(Sub, sub, -);
 operator!(Mul, mul, *);
 operator!(Div, div, /);
 
+impl Neg for Lanes {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        self.map(|value| -value)
+    }
+}
+
 impl AddAssign for Lanes {
     #[inline(always)]
     fn add_assign(&mut self, other: Self) {
         *self = *self + other;
+    }
+}
+
+/// Which lanes something holds for: all bits of a lane or none.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(align(64))]
+pub struct Mask(pub [u32; LANES]);
+
+impl Mask {
+    /// No lane.
+    pub const NONE: Self = Self([0; LANES]);
+
+    /// The first `n` lanes.
+    pub fn first(n: usize) -> Self {
+        Self(std::array::from_fn(|i| if i < n { !0 } else { 0 }))
+    }
+
+    /// Whether it holds for a lane.
+    #[inline(always)]
+    pub fn get(self, lane: usize) -> bool {
+        self.0[lane] != 0
+    }
+
+    /// Says whether it holds for a lane.
+    #[inline(always)]
+    pub fn set(&mut self, lane: usize, holds: bool) {
+        self.0[lane] = if holds { !0 } else { 0 };
+    }
+
+    /// Whether it holds for any lane.
+    #[inline(always)]
+    pub fn any(self) -> bool {
+        self.0.iter().fold(0, |all, lane| all | lane) != 0
+    }
+
+    /// The lanes it holds for.
+    #[inline(always)]
+    pub fn lanes(self) -> impl Iterator<Item = usize> {
+        let mut left = 0u32;
+        for (i, lane) in self.0.iter().enumerate() {
+            left |= (lane & 1) << i;
+        }
+        std::iter::from_fn(move || {
+            let lane = left.trailing_zeros() as usize;
+            left &= left.wrapping_sub(1);
+            (lane < LANES).then_some(lane)
+        })
+    }
+
+    /// `a` where it holds, `b` elsewhere.
+    #[inline(always)]
+    pub fn select(self, a: Lanes, b: Lanes) -> Lanes {
+        let mut out = b.0;
+        for (i, value) in out.iter_mut().enumerate() {
+            *value = if self.0[i] != 0 { a.0[i] } else { *value };
+        }
+        Lanes(out)
+    }
+
+    /// `a` where it holds, `b` elsewhere.
+    #[inline(always)]
+    pub fn select3(self, a: Lanes3, b: Lanes3) -> Lanes3 {
+        Lanes3 { x: self.select(a.x, b.x), y: self.select(a.y, b.y), z: self.select(a.z, b.z) }
+    }
+
+    #[inline(always)]
+    fn zip(self, other: Self, f: impl Fn(u32, u32) -> u32) -> Self {
+        let mut out = self.0;
+        for (a, b) in out.iter_mut().zip(other.0) {
+            *a = f(*a, b);
+        }
+        Self(out)
+    }
+}
+
+impl BitAnd for Mask {
+    type Output = Self;
+    #[inline(always)]
+    fn bitand(self, other: Self) -> Self {
+        self.zip(other, |a, b| a & b)
+    }
+}
+
+impl BitOr for Mask {
+    type Output = Self;
+    #[inline(always)]
+    fn bitor(self, other: Self) -> Self {
+        self.zip(other, |a, b| a | b)
+    }
+}
+
+impl Not for Mask {
+    type Output = Self;
+    #[inline(always)]
+    fn not(self) -> Self {
+        self.zip(self, |a, _| !a)
     }
 }
 
@@ -160,6 +298,12 @@ mod tests {
             assert_eq!(a.where_greater(a, b, b).0[i], x.max(4.0));
             assert_eq!(a.sqrt().0[i], x.sqrt());
         }
+        let odd = Mask(std::array::from_fn(|i| if i % 2 == 1 { !0 } else { 0 }));
+        assert_eq!((odd & a.less(b)).lanes().collect::<Vec<_>>(), [1, 3]);
+        assert_eq!((a.greater(b) | odd).lanes().count(), 13);
+        assert_eq!(odd.select(a, -b).0[..4], [-4.0, 1.0, -4.0, 3.0]);
+        assert!(odd.any() && !(odd & !odd).any() && odd.get(3) && !odd.get(4));
+        assert_eq!(Mask::first(2).lanes().collect::<Vec<_>>(), [0, 1]);
         assert_eq!(a.sum(), 120.0);
         assert_eq!(Lanes::splat(f32::NAN).max(b), b);
     }

@@ -1,0 +1,55 @@
+//! Sixteen unsigned integers that are worked on together.
+
+use super::{LANES, Lanes, Mask};
+
+/// The integers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(align(64))]
+pub struct Bits(pub [u32; LANES]);
+
+impl Bits {
+    /// All zero.
+    pub const ZERO: Self = Self([0; LANES]);
+
+    /// The same value everywhere.
+    #[inline(always)]
+    pub fn splat(value: u32) -> Self {
+        Self([value; LANES])
+    }
+
+    /// A function of every one.
+    #[inline(always)]
+    pub fn map(self, f: impl Fn(u32) -> u32) -> Self {
+        let mut out = self.0;
+        for value in &mut out {
+            *value = f(*value);
+        }
+        Self(out)
+    }
+
+    /// A function of every one and another.
+    #[inline(always)]
+    pub fn zip(self, other: Self, f: impl Fn(u32, u32) -> u32) -> Self {
+        let mut out = self.0;
+        for (a, b) in out.iter_mut().zip(other.0) {
+            *a = f(*a, b);
+        }
+        Self(out)
+    }
+
+    /// Where they equal a value.
+    #[inline(always)]
+    pub fn equal(self, value: u32) -> Mask {
+        Mask(self.map(|lane| if lane == value { !0 } else { 0 }).0)
+    }
+
+    /// The top 24 bits as floats in [0, 1).
+    #[inline(always)]
+    pub fn unit(self) -> Lanes {
+        let mut out = [0.0; LANES];
+        for (value, bits) in out.iter_mut().zip(self.0) {
+            *value = (bits >> 8) as f32 * (1.0 / 16_777_216.0);
+        }
+        Lanes(out)
+    }
+}

@@ -1,0 +1,150 @@
+//! Sixteen vectors, or colours, that are worked on together.
+
+use std::ops::{Add, AddAssign, Mul, Neg, Sub};
+
+use super::{Lanes, Mask};
+use crate::math::{Vec3, vec3};
+
+/// The vectors, by coordinate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lanes3 {
+    /// First coordinates.
+    pub x: Lanes,
+    /// Second coordinates.
+    pub y: Lanes,
+    /// Third coordinates.
+    pub z: Lanes,
+}
+
+impl Lanes3 {
+    /// All zero.
+    pub const ZERO: Self = Self { x: Lanes::ZERO, y: Lanes::ZERO, z: Lanes::ZERO };
+
+    /// The same vector everywhere.
+    #[inline(always)]
+    pub fn splat(value: Vec3) -> Self {
+        Self { x: Lanes::splat(value.x), y: Lanes::splat(value.y), z: Lanes::splat(value.z) }
+    }
+
+    /// The vector of a lane.
+    #[inline(always)]
+    pub fn get(&self, lane: usize) -> Vec3 {
+        vec3(self.x.0[lane], self.y.0[lane], self.z.0[lane])
+    }
+
+    /// Replaces the vector of a lane.
+    #[inline(always)]
+    pub fn set(&mut self, lane: usize, value: Vec3) {
+        (self.x.0[lane], self.y.0[lane], self.z.0[lane]) = value.into();
+    }
+
+    /// Inner products.
+    #[inline(always)]
+    pub fn dot(self, other: Self) -> Lanes {
+        self.x * other.x + self.y * other.y + self.z * other.z
+    }
+
+    /// Outer products.
+    #[inline(always)]
+    pub fn cross(self, other: Self) -> Self {
+        Self {
+            x: self.y * other.z - self.z * other.y,
+            y: self.z * other.x - self.x * other.z,
+            z: self.x * other.y - self.y * other.x,
+        }
+    }
+
+    /// Coordinate by coordinate.
+    #[inline(always)]
+    pub fn scale(self, other: Self) -> Self {
+        Self { x: self.x * other.x, y: self.y * other.y, z: self.z * other.z }
+    }
+
+    /// The vectors at length one; those without a direction are `other`.
+    #[inline(always)]
+    pub fn normalize_or(self, other: Self) -> Self {
+        let inverse = Lanes::splat(1.0) / self.dot(self).sqrt();
+        let possible = inverse.greater(Lanes::ZERO) & inverse.less(Lanes::splat(f32::INFINITY));
+        possible.select3(self * inverse, other)
+    }
+
+    /// Largest coordinates.
+    #[inline(always)]
+    pub fn max_element(self) -> Lanes {
+        self.x.max(self.y).max(self.z)
+    }
+
+    /// Absolute values.
+    #[inline(always)]
+    pub fn abs(self) -> Self {
+        Self { x: self.x.abs(), y: self.y.abs(), z: self.z.abs() }
+    }
+
+    /// Where a coordinate is not zero.
+    #[inline(always)]
+    pub fn nonzero(self) -> Mask {
+        self.abs().max_element().greater(Lanes::ZERO)
+    }
+}
+
+impl Add for Lanes3 {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        Self { x: self.x + other.x, y: self.y + other.y, z: self.z + other.z }
+    }
+}
+
+impl AddAssign for Lanes3 {
+    #[inline(always)]
+    fn add_assign(&mut self, other: Self) {
+        *self = *self + other;
+    }
+}
+
+impl Sub for Lanes3 {
+    type Output = Self;
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        Self { x: self.x - other.x, y: self.y - other.y, z: self.z - other.z }
+    }
+}
+
+impl Neg for Lanes3 {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Self { x: -self.x, y: -self.y, z: -self.z }
+    }
+}
+
+impl Mul<Lanes> for Lanes3 {
+    type Output = Self;
+    #[inline(always)]
+    fn mul(self, factor: Lanes) -> Self {
+        Self { x: self.x * factor, y: self.y * factor, z: self.z * factor }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn vectors_are_as_single_ones() {
+        let (a, b) = (vec3(1.0, -2.0, 0.5), vec3(0.25, 3.0, -1.0));
+        let (many_a, many_b) = (Lanes3::splat(a), Lanes3::splat(b));
+        assert_eq!((many_a + many_b).get(3), a + b);
+        assert_eq!((many_a - many_b).get(4), a - b);
+        assert_eq!((-many_a * Lanes::splat(2.0)).get(4), a * -2.0);
+        assert_eq!(many_a.cross(many_b).get(5), a.cross(b));
+        assert_eq!(many_a.scale(many_b).get(6), a * b);
+        assert_eq!((many_a.dot(many_b).0[7], many_a.abs().max_element().0[8]), (a.dot(b), 2.0));
+        assert!(many_a.normalize_or(many_b).get(9).distance(a.normalize()) < 1e-6);
+        assert_eq!(Lanes3::ZERO.normalize_or(many_b).get(10), b);
+        assert!(many_a.nonzero().get(0) && !Lanes3::ZERO.nonzero().any());
+        let mut one = Lanes3::ZERO;
+        one.set(2, a);
+        assert_eq!((one.get(1), one.get(2)), (Vec3::ZERO, a));
+    }
+}

@@ -1,0 +1,212 @@
+//! Sixteen points of emitters.
+
+use super::{Lamp, Rays, Surfaces, surfaces};
+use crate::math::lanes::{Bits, LANES, Lanes, Lanes3, Mask};
+use crate::math::{Vec3, vec2};
+use crate::scene::{Scene, accel};
+use crate::scene::emitter::{LightPoint, Position};
+use crate::scene::shape::Geometry;
+
+/// Emitter points, as [`LightPoint`] has them.
+#[derive(Clone, Debug)]
+pub struct Lights {
+    /// Positions; directions towards those at infinity.
+    at: Lanes3,
+    /// Normals of those on surfaces.
+    n: Lanes3,
+    /// Which are on surfaces.
+    surface: Mask,
+    /// Which are at infinity.
+    far: Mask,
+    /// Which are their emitters' only points, so that no path runs into them.
+    pub delta: Mask,
+    emitter: Bits,
+    /// Which are on evenly glowing meshes.
+    even: Mask,
+    /// The others.
+    points: [LightPoint; LANES],
+}
+
+impl Default for Lights {
+    fn default() -> Self {
+        Self {
+            at: Lanes3::ZERO,
+            n: Lanes3::ZERO,
+            surface: Mask::NONE,
+            far: Mask::NONE,
+            delta: Mask::NONE,
+            emitter: Bits::ZERO,
+            even: Mask::NONE,
+            points: [LightPoint::at_infinity(Vec3::Z, 0); LANES],
+        }
+    }
+}
+
+impl Lights {
+    /// Replaces one of them.
+    pub fn set(&mut self, lane: usize, point: LightPoint, lamps_are_even: bool) {
+        let (at, n) = match point.position {
+            Position::Surface { p, n } => (p, n),
+            Position::Point { p } => (p, Vec3::ZERO),
+            Position::Infinity { direction } => (direction, Vec3::ZERO),
+        };
+        self.at.set(lane, at);
+        self.n.set(lane, n);
+        self.surface.set(lane, matches!(point.position, Position::Surface { .. }));
+        self.far.set(lane, matches!(point.position, Position::Infinity { .. }));
+        self.delta.set(lane, point.delta);
+        self.emitter.0[lane] = point.emitter;
+        self.even.set(lane, lamps_are_even);
+        self.points[lane] = point;
+    }
+
+    /// One of them.
+    pub fn get(&self, lane: usize) -> LightPoint {
+        if !self.even.get(lane) {
+            return self.points[lane];
+        }
+        let position = Position::Surface { p: self.at.get(lane), n: self.n.get(lane) };
+        LightPoint { emitter: self.emitter.0[lane], ..LightPoint::drawn(position, Default::default()) }
+    }
+
+    /// Unit directions towards them, and [`LightPoint::solid_angle`].
+    #[inline(always)]
+    pub fn seen_from(&self, from: Lanes3) -> (Lanes3, Lanes) {
+        let one = Lanes::splat(1.0);
+        let to = self.at - from;
+        let squared = to.dot(to);
+        let inverse = one / squared.sqrt();
+        let direction = squared.greater(Lanes::ZERO).select3(to * inverse, Lanes3::ZERO);
+        let per_distance = inverse * inverse;
+        let cosine = -self.n.dot(direction);
+        let of_surface = cosine.greater(Lanes::ZERO).select(cosine * per_distance, Lanes::ZERO);
+        let angle = self.surface.select(of_surface, self.far.select(one, per_distance));
+        (self.far.select3(self.at, direction), angle)
+    }
+
+    /// Densities of running into them by scattering of density `pdf`: never, into only points.
+    #[inline(always)]
+    pub fn scatter_pdf(&self, pdf: Lanes) -> Lanes {
+        self.delta.select(Lanes::ZERO, pdf)
+    }
+}
+
+impl Scene {
+    /// Emitter points for the active surfaces, with their densities per solid angle including the choice of emitter;
+    /// returns for which there is one.
+    #[inline(always)]
+    pub fn sample_lights(
+        &self,
+        from: &Surfaces,
+        active: Mask,
+        (choice, [u, v]): (Lanes, [Lanes; 2]),
+        lights: &mut Lights,
+    ) -> (Mask, Lanes) {
+        let mut found = Mask::NONE;
+        let mut pdf = Lanes::ZERO;
+        let Some(table) = self.emitter_choice.as_ref() else { return (found, pdf) };
+        let mut corners = [[[0.0f32; LANES]; 3]; 6];
+        let (mut side, mut second, mut density) = ([1.0f32; LANES], [0.0f32; LANES], [0.0f32; LANES]);
+        (lights.delta, lights.far, lights.even) = (Mask::NONE, Mask::NONE, Mask::NONE);
+        for lane in active.lanes() {
+            let (index, chance) = table.choose(from.p.get(lane), choice.0[lane]);
+            let Lamp { mesh, density: per_area, .. } = &self.lamps[index];
+            let Some(Geometry::Mesh(mesh)) = mesh.as_deref() else {
+                let p = from.p.get(lane);
+                let emitter = &self.emitters[index];
+                let Some(mut point) = emitter.sample(p, vec2(u.0[lane], v.0[lane])) else { continue };
+                point.emitter = index as u32;
+                let one = emitter.pdf(p, &point) * chance;
+                if one > 0.0 {
+                    lights.set(lane, point, false);
+                    found.set(lane, true);
+                    pdf.0[lane] = one;
+                }
+                continue;
+            };
+            let Some((triangle, rest)) = mesh.triangle(v.0[lane]) else { continue };
+            let one = mesh.corners(triangle);
+            for (to, from) in corners.iter_mut().zip(one.p.iter().chain(&one.n)) {
+                (to[0][lane], to[1][lane], to[2][lane]) = (*from).into();
+            }
+            (side[lane], second[lane], density[lane]) = (mesh.side(), rest, *per_area);
+            lights.emitter.0[lane] = index as u32;
+            lights.even.set(lane, true);
+        }
+        let even = lights.even;
+        if even.any() {
+            let [a, b, c, na, nb, nc] = corners.map(|[x, y, z]| Lanes3 { x: Lanes(x), y: Lanes(y), z: Lanes(z) });
+            // Uniform over a triangle, as `warp::triangle`.
+            let one = Lanes::splat(1.0);
+            let root = (one - u).max(Lanes::ZERO).sqrt();
+            let (second_weight, third_weight) = (one - root, Lanes(second) * root);
+            let weight = one - second_weight - third_weight;
+            let side = Lanes(side);
+            let flat = (b - a).cross(c - a).normalize_or(Lanes3::splat(Vec3::Z)) * side;
+            let smooth = (na * weight + nb * second_weight + nc * third_weight).normalize_or(flat * side) * side;
+            lights.at = even.select3(a * weight + b * second_weight + c * third_weight, lights.at);
+            lights.n = even.select3(flat * one.copysign(flat.dot(smooth)), lights.n);
+            lights.surface = lights.surface | even;
+            let (_, angle) = lights.seen_from(from.p);
+            let seen = even & angle.greater(Lanes::ZERO);
+            pdf = seen.select(Lanes(density) / angle, pdf);
+            found = found | seen;
+        }
+        (found, pdf)
+    }
+
+    /// Radiance that emitter points send from `direction`, in which they are seen.
+    #[inline(always)]
+    pub fn light_radiance(&self, lights: &Lights, direction: Lanes3, active: Mask) -> Lanes3 {
+        let mut radiance = Lanes3::ZERO;
+        for lane in (active & lights.even).lanes() {
+            radiance.set(lane, self.lamps[lights.emitter.0[lane] as usize].radiance);
+        }
+        radiance = lights.n.dot(direction).less(Lanes::ZERO).select3(radiance, Lanes3::ZERO);
+        for lane in (active & !lights.even).lanes() {
+            radiance.set(lane, self.radiance(&lights.points[lane], -direction.get(lane)));
+        }
+        radiance
+    }
+
+    /// Density with which [`Scene::sample_lights`] finds emitter points from elsewhere, where they have such solid angles.
+    #[inline(always)]
+    pub fn light_pdf(&self, lights: &Lights, (from, angle): (Lanes3, Lanes), active: Mask) -> Lanes {
+        let mut density = Lanes::ZERO;
+        let Some(table) = self.emitter_choice.as_ref() else { return density };
+        let quick = if table.constant(0).is_some() { lights.even } else { Mask::NONE };
+        for lane in (active & quick).lanes() {
+            density.0[lane] = self.lamps[lights.emitter.0[lane] as usize].density;
+        }
+        let mut pdf = angle.greater(Lanes::ZERO).select(density / angle, Lanes::ZERO);
+        for lane in (active & !quick).lanes() {
+            pdf.0[lane] = self.emitter_pdf(from.get(lane), &lights.get(lane));
+        }
+        pdf
+    }
+
+    /// Which emitter points light pass from to the surfaces, of the active ones.
+    pub fn visible_packet(&self, from: &Surfaces, lights: &Lights, active: Mask) -> Mask {
+        active & !self.accel.occluded_packet(&shadow_rays(self.accel.size(), from, lights), active)
+    }
+
+    /// The point of an emitter as packets keep it.
+    pub fn keep_light(&self, lights: &mut Lights, lane: usize, point: LightPoint) {
+        lights.set(lane, point, self.lamps[point.emitter as usize].mesh.is_some());
+    }
+}
+
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
+fn shadow_rays(scene_size: f32, from: &Surfaces, lights: &Lights) -> Rays {
+    let towards = lights.far.select3(lights.at, lights.at - from.p);
+    let origin = from.leave(towards);
+    let near = surfaces::offset(
+        lights.at,
+        lights.n,
+        surfaces::epsilon(lights.at, scene_size),
+        from.p - lights.at,
+    );
+    let end = lights.surface.select3(near, lights.at);
+    let t_far = lights.far.select(Lanes::splat(f32::INFINITY), Lanes::splat(accel::SHADOW_END));
+    Rays { origin, direction: lights.far.select3(lights.at, end - origin), t_far }
+}

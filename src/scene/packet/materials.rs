@@ -1,0 +1,233 @@
+//! How sixteen surfaces scatter.
+
+use std::f32::consts::{FRAC_1_PI, FRAC_PI_4};
+
+use super::{Finish, Surfaces};
+use crate::math::Rgb;
+use crate::math::lanes::{Bits, Lanes, Lanes3, Mask};
+use crate::math::vec2;
+use crate::scene::Scene;
+use crate::scene::bsdf::{BsdfSample, Eval, Lobe};
+
+/// The materials of surfaces.
+#[derive(Clone, Debug)]
+pub struct Materials {
+    /// Which are diffuse and nothing else.
+    lambert: Mask,
+    two_sided: Mask,
+    /// Reflectance of those.
+    color: Lanes3,
+    /// Smallest roughness of the smooth lobes, infinite for diffuse ones; negative without smooth lobes.
+    pub roughness: Lanes,
+}
+
+/// The smooth lobes in pairs of directions, as [`Eval`] has them.
+#[derive(Clone, Copy, Debug)]
+pub struct Evals {
+    /// f |cos θo|.
+    pub value: Lanes3,
+    /// Density per solid angle.
+    pub pdf: Lanes,
+}
+
+/// Sampled directions, as [`BsdfSample`] has them.
+#[derive(Clone, Debug)]
+pub struct Scatters {
+    /// Outgoing directions.
+    pub wo: Lanes3,
+    /// f |cos θo| / pdf.
+    pub weight: Lanes3,
+    /// Densities.
+    pub pdf: Lanes,
+    /// Lobes, by their number among [`LOBES`].
+    lobe: Bits,
+    /// Relative indices of refraction.
+    pub eta: Lanes,
+}
+
+/// Smooth ones are number 0.
+const LOBES: [Lobe; 4] = [Lobe::Smooth, Lobe::DeltaReflect, Lobe::DeltaTransmit, Lobe::Null];
+
+impl Default for Materials {
+    fn default() -> Self {
+        Self { lambert: Mask::NONE, two_sided: Mask::NONE, color: Lanes3::ZERO, roughness: Lanes::ZERO }
+    }
+}
+
+impl Default for Evals {
+    fn default() -> Self {
+        Self { value: Lanes3::ZERO, pdf: Lanes::ZERO }
+    }
+}
+
+impl Evals {
+    fn set(&mut self, lane: usize, Eval { value, pdf }: Eval) {
+        self.value.set(lane, value);
+        self.pdf.0[lane] = pdf;
+    }
+
+    /// One of them.
+    pub fn get(&self, lane: usize) -> Eval {
+        Eval { value: self.value.get(lane), pdf: self.pdf.0[lane] }
+    }
+}
+
+impl Default for Scatters {
+    fn default() -> Self {
+        let zero = Lanes::ZERO;
+        Self { wo: Lanes3::ZERO, weight: Lanes3::ZERO, pdf: zero, lobe: Bits::ZERO, eta: zero }
+    }
+}
+
+impl Scatters {
+    fn set(&mut self, lane: usize, sample: &BsdfSample) {
+        self.wo.set(lane, sample.wo);
+        self.weight.set(lane, sample.weight);
+        self.pdf.0[lane] = sample.pdf;
+        self.lobe.0[lane] = LOBES.iter().position(|&lobe| lobe == sample.lobe).unwrap_or_default() as u32;
+        self.eta.0[lane] = sample.eta;
+    }
+
+    /// One of them.
+    pub fn get(&self, lane: usize) -> BsdfSample {
+        BsdfSample {
+            wo: self.wo.get(lane),
+            weight: self.weight.get(lane),
+            pdf: self.pdf.0[lane],
+            lobe: LOBES[self.lobe.0[lane] as usize],
+            eta: self.eta.0[lane],
+        }
+    }
+
+    /// Which are of smooth lobes.
+    #[inline(always)]
+    pub fn smooth(&self) -> Mask {
+        self.lobe.equal(0)
+    }
+}
+
+impl Materials {
+    /// Becomes the materials of the active ones of some surfaces.
+    pub fn look(&mut self, scene: &Scene, surfaces: &Surfaces, active: Mask) {
+        (self.lambert, self.two_sided) = (Mask::NONE, Mask::NONE);
+        self.roughness = Lanes::splat(f32::INFINITY);
+        for lane in active.lanes() {
+            let Finish { lambert, two_sided, color, texture, .. } = &scene.finishes[surfaces.shape.0[lane] as usize];
+            if !lambert {
+                let surface = surfaces.get(lane);
+                self.roughness.0[lane] = scene.bsdf(&surface).roughness(&surface).unwrap_or(-1.0);
+                continue;
+            }
+            self.lambert.set(lane, true);
+            self.two_sided.set(lane, *two_sided);
+            self.color.set(lane, texture.as_ref().map_or(*color, |texture| texture.color(&surfaces.at(lane))));
+        }
+    }
+
+    /// One of them, with the number of its lane, in another packet's.
+    #[inline(always)]
+    pub fn copy(&mut self, to: usize, from: &Self, lane: usize) {
+        self.lambert.0[to] = from.lambert.0[lane];
+        self.two_sided.0[to] = from.two_sided.0[lane];
+        self.color.set(to, from.color.get(lane));
+        self.roughness.0[to] = from.roughness.0[lane];
+    }
+
+    /// Which have smooth lobes.
+    #[inline(always)]
+    pub fn smooth(&self) -> Mask {
+        !self.roughness.less(Lanes::ZERO)
+    }
+
+    /// Overall colour of one.
+    pub fn albedo(&self, scene: &Scene, surfaces: &Surfaces, lane: usize) -> Rgb {
+        if self.lambert.get(lane) {
+            return self.color.get(lane).clamp(Rgb::ZERO, Rgb::ONE);
+        }
+        let surface = surfaces.get(lane);
+        scene.bsdf(&surface).albedo(&surface)
+    }
+
+    /// Heights over the side that scatters, of those that are diffuse: the back of a two-sided one is a front, too.
+    #[inline(always)]
+    fn height(&self, wi: Lanes3, w: Lanes) -> Lanes {
+        (self.two_sided & wi.z.less(Lanes::ZERO)).select(-w, w)
+    }
+
+    /// The smooth lobes of the active ones; the others' values are zero.
+    #[inline(always)]
+    pub fn eval(&self, scene: &Scene, surfaces: &Surfaces, (wi, wo): (Lanes3, Lanes3), active: Mask) -> Evals {
+        let (in_height, out_height) = (self.height(wi, wi.z), self.height(wi, wo.z));
+        let scatters =
+            active & self.lambert & in_height.greater(Lanes::ZERO) & out_height.greater(Lanes::ZERO);
+        let pdf = scatters.select(out_height * Lanes::splat(FRAC_1_PI), Lanes::ZERO);
+        let mut evals = Evals { value: self.color * pdf, pdf };
+        for lane in (active & !self.lambert).lanes() {
+            let surface = surfaces.get(lane);
+            evals.set(lane, scene.bsdf(&surface).eval(&surface, wi.get(lane), wo.get(lane)));
+        }
+        evals
+    }
+
+    /// Directions for the active ones; returns which have one.
+    #[inline(always)]
+    pub fn sample(
+        &self,
+        scene: &Scene,
+        surfaces: &Surfaces,
+        (lobe, [u, v]): (Lanes, [Lanes; 2]),
+        active: Mask,
+        to: &mut Scatters,
+    ) -> Mask {
+        let (x, y) = disk(u, v);
+        let one = Lanes::splat(1.0);
+        let height = (one - (x * x + y * y)).max(Lanes::ZERO).sqrt();
+        let in_height = self.height(surfaces.wi, surfaces.wi.z);
+        let mut found = active & self.lambert & in_height.greater(Lanes::ZERO) & height.greater(Lanes::ZERO);
+        to.wo = Lanes3 { x, y, z: self.height(surfaces.wi, height) };
+        (to.weight, to.pdf) = (self.color, height * Lanes::splat(FRAC_1_PI));
+        (to.lobe, to.eta) = (Bits::ZERO, one);
+        for lane in (active & !self.lambert).lanes() {
+            let surface = surfaces.get(lane);
+            let numbers = vec2(u.0[lane], v.0[lane]);
+            if let Some(sample) = scene.bsdf(&surface).sample(&surface, surface.wi, lobe.0[lane], numbers) {
+                to.set(lane, &sample);
+                found.set(lane, true);
+            }
+        }
+        found
+    }
+}
+
+/// [`crate::math::warp::disk`].
+#[inline(always)]
+pub fn disk(u: Lanes, v: Lanes) -> (Lanes, Lanes) {
+    let (two, one) = (Lanes::splat(2.0), Lanes::splat(1.0));
+    let (x, y) = (two * u - one, two * v - one);
+    let wide = x.abs().greater(y.abs());
+    let (radius, other) = (wide.select(x, y), wide.select(y, x));
+    let nonzero = radius.abs().greater(Lanes::ZERO);
+    let angle = nonzero.select(Lanes::splat(FRAC_PI_4) * (other / radius), Lanes::ZERO);
+    // Angles are at most an eighth of a turn, where a few terms are exact.
+    let squared = angle * angle;
+    let series = |terms: [f32; 5]| terms.into_iter().fold(Lanes::ZERO, |sum, term| sum * squared + Lanes::splat(term));
+    let cosine = series([1.0 / 40_320.0, -1.0 / 720.0, 1.0 / 24.0, -0.5, 1.0]);
+    let sine = angle * series([1.0 / 362_880.0, -1.0 / 5_040.0, 1.0 / 120.0, -1.0 / 6.0, 1.0]);
+    (radius * wide.select(cosine, sine), radius * wide.select(sine, cosine))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::warp;
+
+    #[test]
+    fn the_disk_is_the_disk() {
+        for i in 0..1000 {
+            let u = vec2((i as f32 * 0.618_034).fract(), (i as f32 * 0.754_877).fract());
+            let (x, y) = disk(Lanes::splat(u.x), Lanes::splat(u.y));
+            assert!(warp::disk(u).distance(vec2(x.0[3], y.0[3])) < 1e-6);
+        }
+        assert_eq!(disk(Lanes::splat(0.5), Lanes::splat(0.5)), (Lanes::ZERO, Lanes::ZERO));
+    }
+}

@@ -1,0 +1,270 @@
+//! Sixteen surfaces.
+
+use super::{Finish, Rays};
+use crate::ffi::embree::Hits;
+use crate::math::lanes::{Bits, LANES, Lanes, Lanes3, Mask};
+use crate::math::{Frame, Vec3, vec2};
+use crate::scene::emitter::LightPoint;
+use crate::scene::shape::Geometry;
+use crate::scene::{Scene, Shape, Surface, accel, surface, texture};
+
+/// Sixteen orthonormal frames.
+#[derive(Clone, Copy, Debug)]
+pub struct Frames {
+    /// First tangents.
+    pub s: Lanes3,
+    /// Second tangents.
+    pub t: Lanes3,
+    /// Normals.
+    pub n: Lanes3,
+}
+
+impl Frames {
+    /// [`Frame::around`].
+    #[inline(always)]
+    pub fn around(n: Lanes3) -> Self {
+        let one = Lanes::splat(1.0);
+        let sign = one.copysign(n.z);
+        let a = -one / (sign + n.z);
+        let b = n.x * n.y * a;
+        let s = Lanes3 { x: one + sign * n.x * n.x * a, y: sign * b, z: -sign * n.x };
+        let t = Lanes3 { x: b, y: sign + n.y * n.y * a, z: -n.y };
+        Self { s, t, n }
+    }
+
+    /// World to local.
+    #[inline(always)]
+    pub fn to_local(&self, v: Lanes3) -> Lanes3 {
+        Lanes3 { x: self.s.dot(v), y: self.t.dot(v), z: self.n.dot(v) }
+    }
+
+    /// Local to world.
+    #[inline(always)]
+    pub fn to_world(&self, v: Lanes3) -> Lanes3 {
+        self.s * v.x + self.t * v.y + self.n * v.z
+    }
+}
+
+/// Surfaces, as [`Surface`] has them.
+#[derive(Clone, Debug)]
+pub struct Surfaces {
+    /// Positions.
+    pub p: Lanes3,
+    /// Geometric normals.
+    pub n: Lanes3,
+    /// Shading frames.
+    pub frame: Frames,
+    /// Directions back to where the rays came from, in the shading frames.
+    pub wi: Lanes3,
+    /// How far rays start off the surfaces.
+    pub epsilon: Lanes,
+    /// Numbers of their shapes.
+    pub shape: Bits,
+    uv: [Lanes; 2],
+    barycentric: [Lanes; 2],
+    primitive: Bits,
+    dp_du: Lanes3,
+    dp_dv: Lanes3,
+}
+
+impl Default for Surfaces {
+    fn default() -> Self {
+        let zero = Lanes3::ZERO;
+        Self {
+            p: zero,
+            n: zero,
+            frame: Frames { s: zero, t: zero, n: zero },
+            wi: zero,
+            epsilon: Lanes::ZERO,
+            shape: Bits::ZERO,
+            uv: [Lanes::ZERO; 2],
+            barycentric: [Lanes::ZERO; 2],
+            primitive: Bits::ZERO,
+            dp_du: zero,
+            dp_dv: zero,
+        }
+    }
+}
+
+impl Surfaces {
+    /// One of them.
+    #[inline]
+    pub fn get(&self, lane: usize) -> Surface {
+        let frame = Frame { s: self.frame.s.get(lane), t: self.frame.t.get(lane), n: self.frame.n.get(lane) };
+        Surface {
+            p: self.p.get(lane),
+            n: self.n.get(lane),
+            frame,
+            at: self.at(lane),
+            dp_du: self.dp_du.get(lane),
+            dp_dv: self.dp_dv.get(lane),
+            epsilon: self.epsilon.0[lane],
+            wi: self.wi.get(lane),
+        }
+    }
+
+    /// Where textures are looked up on one of them.
+    #[inline]
+    pub fn at(&self, lane: usize) -> texture::Point {
+        texture::Point {
+            uv: vec2(self.uv[0].0[lane], self.uv[1].0[lane]),
+            barycentric: vec2(self.barycentric[0].0[lane], self.barycentric[1].0[lane]),
+            primitive: self.primitive.0[lane],
+            shape: self.shape.0[lane],
+        }
+    }
+
+    /// Replaces one of them.
+    pub fn set(&mut self, lane: usize, surface: &Surface) {
+        self.p.set(lane, surface.p);
+        self.n.set(lane, surface.n);
+        self.frame.s.set(lane, surface.frame.s);
+        self.frame.t.set(lane, surface.frame.t);
+        self.frame.n.set(lane, surface.frame.n);
+        self.wi.set(lane, surface.wi);
+        self.epsilon.0[lane] = surface.epsilon;
+        self.shape.0[lane] = surface.at.shape;
+        (self.uv[0].0[lane], self.uv[1].0[lane]) = surface.at.uv.into();
+        (self.barycentric[0].0[lane], self.barycentric[1].0[lane]) = surface.at.barycentric.into();
+        self.primitive.0[lane] = surface.at.primitive;
+        self.dp_du.set(lane, surface.dp_du);
+        self.dp_dv.set(lane, surface.dp_dv);
+    }
+
+    /// Replaces one of them by one of others.
+    #[inline(always)]
+    pub fn copy(&mut self, to: usize, from: &Self, lane: usize) {
+        let copy3 = |to_lanes: &mut Lanes3, from_lanes: &Lanes3| to_lanes.set(to, from_lanes.get(lane));
+        copy3(&mut self.p, &from.p);
+        copy3(&mut self.n, &from.n);
+        copy3(&mut self.frame.s, &from.frame.s);
+        copy3(&mut self.frame.t, &from.frame.t);
+        copy3(&mut self.frame.n, &from.frame.n);
+        copy3(&mut self.wi, &from.wi);
+        copy3(&mut self.dp_du, &from.dp_du);
+        copy3(&mut self.dp_dv, &from.dp_dv);
+        self.epsilon.0[to] = from.epsilon.0[lane];
+        self.shape.0[to] = from.shape.0[lane];
+        self.primitive.0[to] = from.primitive.0[lane];
+        for k in 0..2 {
+            self.uv[k].0[to] = from.uv[k].0[lane];
+            self.barycentric[k].0[to] = from.barycentric[k].0[lane];
+        }
+    }
+
+    /// Where rays along `direction` start.
+    #[inline(always)]
+    pub fn leave(&self, direction: Lanes3) -> Lanes3 {
+        offset(self.p, self.n, self.epsilon, direction)
+    }
+}
+
+/// Points moved off their surfaces to the sides that `direction` leaves on.
+#[inline(always)]
+pub(super) fn offset(p: Lanes3, n: Lanes3, epsilon: Lanes, direction: Lanes3) -> Lanes3 {
+    p + n * epsilon.copysign(n.dot(direction))
+}
+
+/// [`surface::epsilon`].
+#[inline(always)]
+pub(super) fn epsilon(p: Lanes3, scene_size: f32) -> Lanes {
+    Lanes::splat(surface::RAY_EPSILON) * (Lanes::splat(scene_size.min(1.0)) + p.abs().max_element())
+}
+
+impl Scene {
+    /// The first surfaces along the active rays, and which have one. `coherent`: they start and run close together.
+    pub fn intersect_packet(&self, rays: &Rays, active: Mask, coherent: bool, surfaces: &mut Surfaces) -> Mask {
+        let hits = self.accel.intersect_packet(rays, active, coherent);
+        let found = !Bits(hits.geometry).equal(u32::MAX) & active;
+        let left = meshes((&self.shapes, &self.finishes), self.accel.size(), rays, &hits, found, surfaces);
+        for lane in left.lanes() {
+            let Some(hit) = hits.get(lane) else { continue };
+            let mut one = self.accel.surface(&self.shapes, &hit, rays.get(lane));
+            one.epsilon = self.epsilon(one.p);
+            surfaces.set(lane, &one);
+        }
+        found
+    }
+
+    /// Goes on to what camera rays show behind the emitters that they have met.
+    pub fn pass_emitters(&self, rays: &Rays, met: &mut Mask, surfaces: &mut Surfaces) {
+        for lane in met.lanes() {
+            if self.finishes[surfaces.shape.0[lane] as usize].emitter.is_none() {
+                continue;
+            }
+            match self.intersect_from_camera(rays.get(lane)) {
+                Some(surface) => surfaces.set(lane, &surface),
+                None => met.set(lane, false),
+            }
+        }
+    }
+
+    /// One of the surfaces as a point of its emitter, if it is one.
+    #[inline]
+    pub fn light_point_of(&self, surfaces: &Surfaces, lane: usize) -> Option<LightPoint> {
+        let emitter = self.finishes[surfaces.shape.0[lane] as usize].emitter?;
+        Some(LightPoint::on_surface(&surfaces.get(lane), emitter))
+    }
+
+    /// Which surface points see those of others, of the active ones.
+    pub fn mutually_visible_packet(&self, a: &Surfaces, b: &Surfaces, active: Mask) -> Mask {
+        active & !self.accel.occluded_packet(&between(a, b), active)
+    }
+}
+
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
+fn between(a: &Surfaces, b: &Surfaces) -> Rays {
+    let origin = a.leave(b.p - a.p);
+    let end = b.leave(a.p - b.p);
+    Rays { origin, direction: end - origin, t_far: Lanes::splat(accel::SHADOW_END) }
+}
+
+/// The surfaces of those hits that are on plain meshes; returns the others.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
+fn meshes(
+    (shapes, finishes): (&[Shape], &[Finish]),
+    scene_size: f32,
+    rays: &Rays,
+    hits: &Hits,
+    found: Mask,
+    surfaces: &mut Surfaces,
+) -> Mask {
+    let mut left = Mask::NONE;
+    let mut corners = [[[0.0f32; LANES]; 3]; 6];
+    let mut side = [1.0f32; LANES];
+    let (u, v) = (Lanes(hits.u), Lanes(hits.v));
+    surfaces.uv = [u, v];
+    for lane in found.lanes() {
+        let number = hits.geometry[lane] as usize;
+        if hits.instance[lane] != u32::MAX || !finishes[number].mesh {
+            left.set(lane, true);
+            continue;
+        }
+        let Geometry::Mesh(mesh) = &*shapes[number].geometry else { continue };
+        let one = mesh.corners(hits.primitive[lane]);
+        for (to, from) in corners.iter_mut().zip(one.p.iter().chain(&one.n)) {
+            (to[0][lane], to[1][lane], to[2][lane]) = (*from).into();
+        }
+        side[lane] = mesh.side();
+        if finishes[number].uv {
+            let (u, v) = (hits.u[lane], hits.v[lane]);
+            (surfaces.uv[0].0[lane], surfaces.uv[1].0[lane]) = mesh.uv_at(hits.primitive[lane], [1.0 - u - v, u, v]).into();
+        }
+    }
+    let [a, b, c, na, nb, nc] = corners.map(|[x, y, z]| Lanes3 { x: Lanes(x), y: Lanes(y), z: Lanes(z) });
+    let weight = Lanes::splat(1.0) - u - v;
+    let side = Lanes(side);
+    let up = Lanes3::splat(Vec3::Z);
+    let flat = (b - a).cross(c - a).normalize_or(up) * side;
+    let smooth = (na * weight + nb * u + nc * v).normalize_or(flat * side) * side;
+    let frame = Frames::around(smooth);
+    surfaces.p = a * weight + b * u + c * v;
+    surfaces.n = flat * Lanes::splat(1.0).copysign(flat.dot(smooth));
+    surfaces.frame = frame;
+    surfaces.wi = frame.to_local(-rays.direction);
+    surfaces.epsilon = epsilon(surfaces.p, scene_size);
+    surfaces.shape = Bits(hits.geometry);
+    surfaces.barycentric = [u, v];
+    surfaces.primitive = Bits(hits.primitive);
+    left
+}
