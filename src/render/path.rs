@@ -39,10 +39,34 @@ pub fn emission(scene: &Scene, packet: &Packet, vertices: &Vertices, lane: usize
     Some(Met { point, radiance, light_pdf, color })
 }
 
-/// Lights the active ones of some vertices by emitter points; returns the light that reaches the camera.
+/// What has come of the paths at a vertex.
+pub struct Shaded {
+    /// Light from chosen emitter points that reaches the camera, where the vertices are lit.
+    pub color: Lanes3,
+    /// Which have a throughput that is not finite.
+    pub broken: Mask,
+}
+
+/// Lights some vertices by emitter points and chooses where their paths go on. `first_place` is the number of the first one
+/// among all of the level.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-pub fn light(scene: &Scene, sampler: &Sampler, depth: u32, hash: Bits, vertices: &mut Vertices, active: Mask) -> Lanes3 {
+pub fn shade(
+    (scene, sampler): (&Scene, &Sampler),
+    depth: u32,
+    packet: &Packet,
+    vertices: &mut Vertices,
+    first_place: u32,
+    onward: &mut Paths,
+) -> Shaded {
+    let color = light(scene, sampler, depth, packet.hash, vertices);
+    let broken = scatter((scene, sampler), depth, packet, vertices, first_place, onward);
+    Shaded { color, broken }
+}
+
+#[inline(always)]
+fn light(scene: &Scene, sampler: &Sampler, depth: u32, hash: Bits, vertices: &mut Vertices) -> Lanes3 {
     let Vertices { surfaces, materials, light, throughput, .. } = vertices;
+    let active = vertices.met & materials.smooth();
     let numbers = sampler.light(hash, depth);
     let (found, pdf) = scene.sample_lights(surfaces, active, (numbers.choice, numbers.point), &mut light.points);
     let (direction, _) = light.points.seen_from(surfaces.p);
@@ -59,9 +83,8 @@ pub fn light(scene: &Scene, sampler: &Sampler, depth: u32, hash: Bits, vertices:
     vertices.lit.select3(throughput.scale(evals.value).scale(radiance) * weight, Lanes3::ZERO)
 }
 
-/// Chooses where the active ones of some paths go on; returns those whose throughput is not finite.
-#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-pub fn scatter(
+#[inline(always)]
+fn scatter(
     (scene, sampler): (&Scene, &Sampler),
     depth: u32,
     packet: &Packet,

@@ -182,7 +182,8 @@ impl<'a> Wave<'a> {
             if depth == 0 && hide_emitters {
                 scene.pass_emitters(&packet.rays, &mut met, &mut vertices.surfaces);
             }
-            for lane in active.lanes().filter(|_| max_depth > 0) {
+            let ends = if scene.has_environment() { !met | vertices.surfaces.glows } else { met & vertices.surfaces.glows };
+            for lane in (active & ends).lanes().filter(|_| max_depth > 0) {
                 let id = packet.id.0[lane] as usize;
                 let Some(found) = path::emission(scene, packet, vertices, lane, met.get(lane)) else { continue };
                 if depth == 0 {
@@ -221,16 +222,14 @@ impl<'a> Wave<'a> {
                 continue;
             }
             (vertices.met, vertices.id, vertices.throughput) = (met, packet.id, packet.throughput);
-            let smooth = met & vertices.materials.smooth();
-            let color = path::light(scene, &sampler, depth, packet.hash, vertices, smooth);
+            let first_place = (k * LANES) as u32;
+            let shaded = path::shade((scene, &sampler), depth, packet, vertices, first_place, onward);
             for lane in vertices.lit.lanes() {
                 let id = packet.id.0[lane] as usize;
-                traced.samples[id].color += color.get(lane);
+                traced.samples[id].color += shaded.color.get(lane);
                 traced.reach[id] = depth + 1;
             }
-            let first_place = (k * LANES) as u32;
-            let broken = path::scatter((scene, &sampler), depth, packet, vertices, first_place, onward);
-            for lane in broken.lanes() {
+            for lane in shaded.broken.lanes() {
                 traced.samples[packet.id.0[lane] as usize].color = Rgb::NAN;
             }
             for lane in vertices.scattered.lanes().filter(|_| describes || needs.ambient) {

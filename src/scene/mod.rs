@@ -124,7 +124,7 @@ impl Scene {
         }
         emitters.iter_mut().for_each(|emitter| emitter.enclose(accel.bounds()));
         let emitter_choice = Choice::new(&emitters);
-        let chance = |index| emitter_choice.as_ref().and_then(|choice| choice.constant(index)).unwrap_or_default();
+        let chance = |index| emitter_choice.as_ref().and_then(|choice| choice.constant(index));
         let lamps = emitters.iter().enumerate().map(|(i, emitter)| Lamp::new(&**emitter, chance(i))).collect();
         let finishes = shapes.iter().map(Finish::new).collect();
         let environment = surrounding.first().copied();

@@ -5,7 +5,7 @@ pub mod shift;
 mod states;
 
 use self::offsets::{NOTHING, OUTSIDE, Offsets};
-use self::shift::{Shift, Walk};
+use self::shift::{Room, Shift, Walk};
 use self::states::{Level, Prefix};
 use super::wave::{Traced, Views};
 use crate::film::EDGES;
@@ -20,12 +20,14 @@ pub struct Gradient {
     offsets: Offsets,
     states: Level,
     next: Level,
+    room: Room,
 }
 
 impl Gradient {
     /// Differences by a shift, also those that an ambient light would make if asked for.
     pub fn new(shift: Shift, ambient: bool) -> Self {
-        Self { shift, ambient, offsets: Offsets::default(), states: Level::default(), next: Level::default() }
+        let (states, next) = (Level::default(), Level::default());
+        Self { shift, ambient, offsets: Offsets::default(), states, next, room: Room::default() }
     }
 
     /// Whether paths must be recorded to be shifted; they are replayed otherwise.
@@ -59,8 +61,9 @@ impl Gradient {
                 let onward = walk.onward(vertices, lit, apart, |id| reach[id as usize] > k as u32 + 1);
                 for edge in 0..EDGES.len() {
                     let states = self.states.get(packet, edge);
-                    let difference = walk.step(vertices, &onward, lit, states, (&mut self.next, edge), &mut self.offsets);
-                    let inside = lit & states.0.inside;
+                    let inside = lit & states.0.inside();
+                    let (room, next) = (&mut self.room, (&mut self.next, edge));
+                    let difference = walk.step(room, (vertices, &onward), lit, states, next, &mut self.offsets);
                     for lane in inside.lanes() {
                         let sample = &mut samples[vertices.id.0[lane] as usize];
                         sample.edges[edge] += difference.light.get(lane);
@@ -82,12 +85,10 @@ impl Gradient {
             for edge in 0..EDGES.len() {
                 let place = self.offsets.first(sample, edge);
                 let (states, lane) = self.states.at(sample as u32, edge);
-                for states in states {
-                    match place {
-                        OUTSIDE => {}
-                        NOTHING => states.fail(lane),
-                        place => states.part(lane, start, place),
-                    }
+                match place {
+                    OUTSIDE => {}
+                    NOTHING => states.fail(lane),
+                    place => states.part(lane, start, place),
                 }
             }
         }

@@ -44,17 +44,26 @@ impl Prefix {
     }
 }
 
-/// Sixteen states. Those that are in none of the masks have failed, or are outside the image if not `inside`.
+/// How an offset stands to its base path at a vertex.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(u32)]
+pub enum Kind {
+    /// It is outside the image.
+    Outside,
+    /// It could not be continued.
+    Failed,
+    /// It has a vertex of its own.
+    Apart,
+    /// It has just joined the base path's vertex.
+    Joining,
+    /// It is the base path from the last vertex on.
+    Joined,
+}
+
+/// Sixteen states.
 #[derive(Clone)]
 pub struct States {
-    /// Which have an edge to tell of.
-    pub inside: Mask,
-    /// Which have a vertex of their own.
-    pub apart: Mask,
-    /// Which have just joined their base paths' vertices.
-    pub joining: Mask,
-    /// Which are their base paths from the last vertex on.
-    pub joined: Mask,
+    kind: Bits,
     /// What they have gathered.
     pub prefix: Prefixes,
     /// Places of the vertices of those apart.
@@ -66,50 +75,61 @@ pub struct States {
 impl Default for States {
     fn default() -> Self {
         let prefix = Prefixes { throughput: Lanes3::ZERO, ratio: Lanes::ZERO };
-        let none = Mask::NONE;
-        Self { inside: none, apart: none, joining: none, joined: none, prefix, place: Bits::ZERO, wi: Lanes3::ZERO }
+        Self { kind: Bits::ZERO, prefix, place: Bits::ZERO, wi: Lanes3::ZERO }
     }
 }
 
 impl States {
-    fn start(&mut self, lane: usize) {
-        self.inside.set(lane, true);
-        for mask in [&mut self.apart, &mut self.joining, &mut self.joined] {
-            mask.set(lane, false);
-        }
+    /// Which stand so.
+    #[inline(always)]
+    pub fn are(&self, kind: Kind) -> Mask {
+        self.kind.equal(kind as u32)
     }
 
-    fn gather(&mut self, lane: usize, prefix: Prefix) {
+    /// Which have an edge to tell of.
+    #[inline(always)]
+    pub fn inside(&self) -> Mask {
+        !self.are(Kind::Outside)
+    }
+
+    #[inline(always)]
+    fn set(&mut self, lane: usize, kind: Kind, prefix: Prefix) {
+        self.kind.0[lane] = kind as u32;
         self.prefix.throughput.set(lane, prefix.throughput);
         self.prefix.ratio.0[lane] = prefix.ratio;
     }
 
+    /// One stands as another.
+    pub fn copy(&mut self, lane: usize, from: &Self) {
+        self.set(lane, Kind::Failed, from.prefix.get(lane));
+        self.kind.0[lane] = from.kind.0[lane];
+        self.place.0[lane] = from.place.0[lane];
+        self.wi.set(lane, from.wi.get(lane));
+    }
+
     /// One could not be continued.
+    #[inline(always)]
     pub fn fail(&mut self, lane: usize) {
-        self.start(lane);
+        self.kind.0[lane] = Kind::Failed as u32;
     }
 
     /// One has its own vertex.
     pub fn part(&mut self, lane: usize, prefix: Prefix, place: u32) {
-        self.start(lane);
-        self.apart.set(lane, true);
-        self.gather(lane, prefix);
+        self.set(lane, Kind::Apart, prefix);
         self.place.0[lane] = place;
     }
 
     /// One has joined from the local direction given.
+    #[inline(always)]
     pub fn join(&mut self, lane: usize, prefix: Prefix, wi: Vec3) {
-        self.start(lane);
-        self.joining.set(lane, true);
-        self.gather(lane, prefix);
+        self.set(lane, Kind::Joining, prefix);
         self.wi.set(lane, wi);
     }
 
     /// One goes on as its base path.
+    #[inline(always)]
     pub fn follow(&mut self, lane: usize, prefix: Prefix) {
-        self.start(lane);
-        self.joined.set(lane, true);
-        self.gather(lane, prefix);
+        self.set(lane, Kind::Joined, prefix);
     }
 }
 
@@ -117,32 +137,51 @@ impl States {
 /// continuation: a material that is smooth and diffuse at once is joined for the one and not for the other.
 #[derive(Default)]
 pub struct Level {
-    light: Vec<[States; 4]>,
-    scatter: Vec<[States; 4]>,
+    states: Vec<[States; 4]>,
+    /// Those that continue differently, where there are such.
+    continued: Vec<[States; 4]>,
+    split: Vec<[Mask; 4]>,
 }
 
 impl Level {
     /// States of so many packets, none of which is inside yet.
     pub fn reset(&mut self, packets: usize) {
-        for states in [&mut self.light, &mut self.scatter] {
-            states.resize_with(packets.max(states.len()), Default::default);
-            states[..packets].iter_mut().flatten().for_each(|states| states.inside = Mask::NONE);
-        }
+        self.states.resize_with(packets.max(self.states.len()), Default::default);
+        self.continued.resize_with(packets.max(self.continued.len()), Default::default);
+        self.split.clear();
+        self.split.resize(packets, [Mask::NONE; 4]);
+        self.states[..packets].iter_mut().flatten().for_each(|states| states.kind = Bits::ZERO);
     }
 
     /// States of a packet for an edge: for light and for the continuation.
-    pub fn get(&self, packet: usize, edge: usize) -> (&States, &States) {
-        (&self.light[packet][edge], &self.scatter[packet][edge])
+    pub fn get(&mut self, packet: usize, edge: usize) -> (&States, &States) {
+        let (states, split) = (&self.states[packet][edge], self.split[packet][edge]);
+        if !split.any() {
+            return (states, states);
+        }
+        let continued = &mut self.continued[packet][edge];
+        for lane in (!split).lanes() {
+            continued.copy(lane, states);
+        }
+        (states, continued)
     }
 
     /// Which offsets of a packet go on from vertices of their own, across any edge.
-    pub fn apart(&self, packet: usize) -> Mask {
-        self.scatter[packet].iter().fold(Mask::NONE, |all, states| all | (states.apart & states.inside))
+    pub fn apart(&mut self, packet: usize) -> Mask {
+        (0..4).fold(Mask::NONE, |all, edge| all | self.get(packet, edge).1.are(Kind::Apart))
     }
 
-    /// The states for the light and the continuation at a place.
-    pub fn at(&mut self, place: u32, edge: usize) -> ([&mut States; 2], usize) {
+    /// The states at a place, for light and, where it does not differ, for the continuation.
+    #[inline(always)]
+    pub fn at(&mut self, place: u32, edge: usize) -> (&mut States, usize) {
         let (packet, lane) = (place as usize / LANES, place as usize % LANES);
-        ([&mut self.light[packet][edge], &mut self.scatter[packet][edge]], lane)
+        (&mut self.states[packet][edge], lane)
+    }
+
+    /// The states at a place for a continuation that differs.
+    pub fn continued_at(&mut self, place: u32, edge: usize) -> (&mut States, usize) {
+        let (packet, lane) = (place as usize / LANES, place as usize % LANES);
+        self.split[packet][edge].set(lane, true);
+        (&mut self.continued[packet][edge], lane)
     }
 }

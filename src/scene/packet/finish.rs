@@ -2,10 +2,12 @@
 
 use std::sync::Arc;
 
-use crate::math::Rgb;
+use crate::math::alias::Alias;
+use crate::math::{Rgb, Vec3};
 use crate::scene::Shape;
 use crate::scene::emitter::Emitter;
-use crate::scene::shape::Geometry;
+use crate::scene::shape::mesh::Corners;
+use crate::scene::shape::{Geometry, Mesh};
 use crate::scene::texture::Texture;
 
 /// Of a shape.
@@ -49,23 +51,58 @@ impl Finish {
 
 /// Of an emitter.
 pub struct Lamp {
-    /// The mesh, if it is one that glows evenly.
-    pub mesh: Option<Arc<Geometry>>,
-    /// Its radiance.
-    pub radiance: Rgb,
-    /// Density per area of choosing the emitter and a point on it.
+    /// The triangles, if it is a mesh that glows evenly.
+    pub glow: Option<Glow>,
+    /// Density per area of choosing the emitter and a point on it; 0 where the choice depends on the place.
     pub density: f32,
 }
 
+/// A mesh that glows evenly.
+pub struct Glow {
+    /// Its radiance.
+    pub radiance: Rgb,
+    /// Its area.
+    pub area: f32,
+    /// Its triangles by area.
+    pub areas: Alias,
+    /// What is needed of each.
+    pub triangles: Vec<Facet>,
+}
+
+/// A glowing triangle.
+#[derive(Clone, Copy)]
+pub struct Facet {
+    /// A corner.
+    pub corner: Vec3,
+    /// From there to the others.
+    pub sides: [Vec3; 2],
+    /// Unit normal on the side that glows.
+    pub n: Vec3,
+}
+
 impl Lamp {
-    /// What an emitter is like that is chosen with a probability of `chance`.
-    pub fn new(emitter: &dyn Emitter, chance: f32) -> Self {
-        match emitter.even() {
-            Some((geometry, radiance)) if matches!(&**geometry, Geometry::Mesh(_)) => {
-                let density = chance * (1.0 / geometry.area());
-                Self { mesh: Some(Arc::clone(geometry)), radiance, density }
-            }
-            _ => Self { mesh: None, radiance: Rgb::ZERO, density: 0.0 },
-        }
+    /// What an emitter is like that is chosen with a probability of `chance`, if it is the same everywhere.
+    pub fn new(emitter: &dyn Emitter, chance: Option<f32>) -> Self {
+        let glow = emitter.even().and_then(|(geometry, radiance)| match &**geometry {
+            Geometry::Mesh(mesh) => Glow::new(mesh, radiance),
+            _ => None,
+        });
+        let density = glow.as_ref().map_or(0.0, |glow| chance.unwrap_or_default() / glow.area);
+        Self { glow, density }
+    }
+}
+
+impl Glow {
+    /// `None` when nothing glows, or a triangle's shading normals disagree about which side does.
+    fn new(mesh: &Mesh, radiance: Rgb) -> Option<Self> {
+        let facet = |index| {
+            let Corners { p: [a, b, c], n } = *mesh.corners(index);
+            let flat = (b - a).cross(c - a).normalize_or(Vec3::Z) * mesh.side();
+            let sides = n.map(|n| flat.dot(n * mesh.side()));
+            let agree = sides.iter().all(|&side| side >= 0.0) || sides.iter().all(|&side| side < 0.0);
+            agree.then(|| Facet { corner: a, sides: [b - a, c - a], n: flat * 1f32.copysign(sides[0]) })
+        };
+        let triangles = (0..mesh.triangles.len() as u32).map(facet).collect::<Option<_>>()?;
+        Some(Self { radiance, area: mesh.area(), areas: mesh.areas()?.clone(), triangles })
     }
 }

@@ -1,11 +1,11 @@
 //! Sixteen points of emitters.
 
-use super::{Lamp, Rays, Surfaces, surfaces};
+use super::finish::Facet;
+use super::{Rays, Surfaces, surfaces};
 use crate::math::lanes::{Bits, LANES, Lanes, Lanes3, Mask};
-use crate::math::{Vec3, vec2};
+use crate::math::{Rgb, Vec3, vec2};
 use crate::scene::{Scene, accel};
 use crate::scene::emitter::{LightPoint, Position};
-use crate::scene::shape::Geometry;
 
 /// Emitter points, as [`LightPoint`] has them.
 #[derive(Clone, Debug)]
@@ -105,47 +105,43 @@ impl Scene {
         let mut found = Mask::NONE;
         let mut pdf = Lanes::ZERO;
         let Some(table) = self.emitter_choice.as_ref() else { return (found, pdf) };
-        let mut corners = [[[0.0f32; LANES]; 3]; 6];
-        let (mut side, mut second, mut density) = ([1.0f32; LANES], [0.0f32; LANES], [0.0f32; LANES]);
+        let mut facets = [[[0.0f32; LANES]; 3]; 4];
+        let (mut second, mut density) = ([0.0f32; LANES], [0.0f32; LANES]);
         (lights.delta, lights.far, lights.even) = (Mask::NONE, Mask::NONE, Mask::NONE);
         for lane in active.lanes() {
             let (index, chance) = table.choose(from.p.get(lane), choice.0[lane]);
-            let Lamp { mesh, density: per_area, .. } = &self.lamps[index];
-            let Some(Geometry::Mesh(mesh)) = mesh.as_deref() else {
-                let p = from.p.get(lane);
-                let emitter = &self.emitters[index];
-                let Some(mut point) = emitter.sample(p, vec2(u.0[lane], v.0[lane])) else { continue };
-                point.emitter = index as u32;
-                let one = emitter.pdf(p, &point) * chance;
-                if one > 0.0 {
-                    lights.set(lane, point, false);
-                    found.set(lane, true);
-                    pdf.0[lane] = one;
+            let lamp = &self.lamps[index];
+            if let Some(glow) = &lamp.glow {
+                let (triangle, rest) = glow.areas.sample(v.0[lane]);
+                let Facet { corner, sides, n } = glow.triangles[triangle];
+                for (to, from) in facets.iter_mut().zip([corner, sides[0], sides[1], n]) {
+                    (to[0][lane], to[1][lane], to[2][lane]) = from.into();
                 }
+                second[lane] = rest;
+                density[lane] = if lamp.density > 0.0 { lamp.density } else { chance / glow.area };
+                lights.emitter.0[lane] = index as u32;
+                lights.even.set(lane, true);
                 continue;
-            };
-            let Some((triangle, rest)) = mesh.triangle(v.0[lane]) else { continue };
-            let one = mesh.corners(triangle);
-            for (to, from) in corners.iter_mut().zip(one.p.iter().chain(&one.n)) {
-                (to[0][lane], to[1][lane], to[2][lane]) = (*from).into();
             }
-            (side[lane], second[lane], density[lane]) = (mesh.side(), rest, *per_area);
-            lights.emitter.0[lane] = index as u32;
-            lights.even.set(lane, true);
+            let (p, emitter) = (from.p.get(lane), &self.emitters[index]);
+            let Some(mut point) = emitter.sample(p, vec2(u.0[lane], v.0[lane])) else { continue };
+            point.emitter = index as u32;
+            let one = emitter.pdf(p, &point) * chance;
+            if one > 0.0 {
+                lights.set(lane, point, false);
+                found.set(lane, true);
+                pdf.0[lane] = one;
+            }
         }
         let even = lights.even;
         if even.any() {
-            let [a, b, c, na, nb, nc] = corners.map(|[x, y, z]| Lanes3 { x: Lanes(x), y: Lanes(y), z: Lanes(z) });
+            let [corner, side, other_side, n] = facets.map(|[x, y, z]| Lanes3 { x: Lanes(x), y: Lanes(y), z: Lanes(z) });
             // Uniform over a triangle, as `warp::triangle`.
             let one = Lanes::splat(1.0);
             let root = (one - u).max(Lanes::ZERO).sqrt();
-            let (second_weight, third_weight) = (one - root, Lanes(second) * root);
-            let weight = one - second_weight - third_weight;
-            let side = Lanes(side);
-            let flat = (b - a).cross(c - a).normalize_or(Lanes3::splat(Vec3::Z)) * side;
-            let smooth = (na * weight + nb * second_weight + nc * third_weight).normalize_or(flat * side) * side;
-            lights.at = even.select3(a * weight + b * second_weight + c * third_weight, lights.at);
-            lights.n = even.select3(flat * one.copysign(flat.dot(smooth)), lights.n);
+            let p = corner + side * (one - root) + other_side * (Lanes(second) * root);
+            lights.at = even.select3(p, lights.at);
+            lights.n = even.select3(n, lights.n);
             lights.surface = lights.surface | even;
             let (_, angle) = lights.seen_from(from.p);
             let seen = even & angle.greater(Lanes::ZERO);
@@ -160,7 +156,8 @@ impl Scene {
     pub fn light_radiance(&self, lights: &Lights, direction: Lanes3, active: Mask) -> Lanes3 {
         let mut radiance = Lanes3::ZERO;
         for lane in (active & lights.even).lanes() {
-            radiance.set(lane, self.lamps[lights.emitter.0[lane] as usize].radiance);
+            let lamp = &self.lamps[lights.emitter.0[lane] as usize];
+            radiance.set(lane, lamp.glow.as_ref().map_or(Rgb::ZERO, |glow| glow.radiance));
         }
         radiance = lights.n.dot(direction).less(Lanes::ZERO).select3(radiance, Lanes3::ZERO);
         for lane in (active & !lights.even).lanes() {
@@ -192,7 +189,7 @@ impl Scene {
 
     /// The point of an emitter as packets keep it.
     pub fn keep_light(&self, lights: &mut Lights, lane: usize, point: LightPoint) {
-        lights.set(lane, point, self.lamps[point.emitter as usize].mesh.is_some());
+        lights.set(lane, point, self.lamps[point.emitter as usize].glow.is_some());
     }
 }
 

@@ -60,6 +60,8 @@ pub struct Surfaces {
     pub epsilon: Lanes,
     /// Numbers of their shapes.
     pub shape: Bits,
+    /// Which glow; those that are met only.
+    pub glows: Mask,
     uv: [Lanes; 2],
     barycentric: [Lanes; 2],
     primitive: Bits,
@@ -77,6 +79,7 @@ impl Default for Surfaces {
             wi: zero,
             epsilon: Lanes::ZERO,
             shape: Bits::ZERO,
+            glows: Mask::NONE,
             uv: [Lanes::ZERO; 2],
             barycentric: [Lanes::ZERO; 2],
             primitive: Bits::ZERO,
@@ -182,16 +185,15 @@ impl Scene {
             let mut one = self.accel.surface(&self.shapes, &hit, rays.get(lane));
             one.epsilon = self.epsilon(one.p);
             surfaces.set(lane, &one);
+            surfaces.glows.set(lane, self.finishes[one.at.shape as usize].emitter.is_some());
         }
         found
     }
 
     /// Goes on to what camera rays show behind the emitters that they have met.
     pub fn pass_emitters(&self, rays: &Rays, met: &mut Mask, surfaces: &mut Surfaces) {
-        for lane in met.lanes() {
-            if self.finishes[surfaces.shape.0[lane] as usize].emitter.is_none() {
-                continue;
-            }
+        for lane in (*met & surfaces.glows).lanes() {
+            surfaces.glows.set(lane, false);
             match self.intersect_from_camera(rays.get(lane)) {
                 Some(surface) => surfaces.set(lane, &surface),
                 None => met.set(lane, false),
@@ -230,6 +232,7 @@ fn meshes(
     surfaces: &mut Surfaces,
 ) -> Mask {
     let mut left = Mask::NONE;
+    surfaces.glows = Mask::NONE;
     let mut corners = [[[0.0f32; LANES]; 3]; 6];
     let mut side = [1.0f32; LANES];
     let (u, v) = (Lanes(hits.u), Lanes(hits.v));
@@ -240,6 +243,7 @@ fn meshes(
             left.set(lane, true);
             continue;
         }
+        surfaces.glows.set(lane, finishes[number].emitter.is_some());
         let Geometry::Mesh(mesh) = &*shapes[number].geometry else { continue };
         let one = mesh.corners(hits.primitive[lane]);
         for (to, from) in corners.iter_mut().zip(one.p.iter().chain(&one.n)) {

@@ -24,7 +24,7 @@ pub struct Mesh {
     attributes: Vec<(String, Vec<Rgb>)>,
     /// -1 to turn the surface inside out.
     side: f32,
-    /// Triangles by area, for those that glow.
+    /// Triangles by area.
     areas: Option<Alias>,
     area: f32,
     bounds: Bounds,
@@ -201,21 +201,19 @@ impl Mesh {
 
     /// A point uniform over the area.
     pub fn sample(&self, u: Vec2) -> Option<LightPoint> {
-        let (index, rest) = self.triangle(u.y)?;
-        let corners = self.corners(index);
+        let (index, rest) = self.areas.as_ref()?.sample(u.y);
+        let corners = self.corners(index as u32);
         let b = warp::triangle(vec2(u.x, rest));
         let weights = [1.0 - b.x - b.y, b.x, b.y];
         let p = corners.p[0] * weights[0] + corners.p[1] * weights[1] + corners.p[2] * weights[2];
         let (n, _) = self.normals_at(corners, weights);
         let position = Position::Surface { p, n };
-        Some(LightPoint::drawn(position, self.texture_point(index, weights)))
+        Some(LightPoint::drawn(position, self.texture_point(index as u32, weights)))
     }
 
-    /// The triangle that `u` falls on when they are laid side by side by area, and `u` stretched over it.
-    #[inline]
-    pub fn triangle(&self, u: f32) -> Option<(u32, f32)> {
-        let (index, rest) = self.areas.as_ref()?.sample(u);
-        Some((index as u32, rest))
+    /// Triangles by area; `None` without any.
+    pub fn areas(&self) -> Option<&Alias> {
+        self.areas.as_ref()
     }
 
     /// Density of [`Mesh::sample`] per solid angle at `from`.

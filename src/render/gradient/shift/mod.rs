@@ -4,7 +4,7 @@ pub mod half_vector;
 pub mod reconnect;
 mod walk;
 
-pub use self::walk::{Onward, Walk};
+pub use self::walk::{Room, Walk};
 use crate::math::Rgb;
 
 /// How the base path of a pixel becomes a path of its neighbour.

@@ -6,7 +6,7 @@ use super::reconnect::{Connections, Ends};
 use crate::math::Rgb;
 use crate::math::lanes::{LANES, Lanes, Lanes3, Mask};
 use crate::render::gradient::offsets::{Offsets, Packet};
-use crate::render::gradient::states::{Level, Prefix, Prefixes, States};
+use crate::render::gradient::states::{Kind, Level, Prefix, Prefixes, States};
 use crate::render::vertices::Vertices;
 use crate::scene::bsdf::{BsdfSample, Lobe};
 use crate::scene::packet::{Evals, Surfaces};
@@ -71,6 +71,13 @@ pub struct Walk<'a> {
     pub below: &'a [Vertices],
 }
 
+/// Offsets' own vertices, and where those go by themselves that are not connected.
+#[derive(Default)]
+pub struct Room {
+    own: Packet,
+    extended: Vec<(usize, Option<Extended>)>,
+}
+
 impl Walk<'_> {
     /// What the vertices of `active` paths lead to; `apart` are those that offsets may have to be connected to. `reaches`
     /// says whether light reaches the next vertex of a sample's path.
@@ -105,33 +112,17 @@ impl Walk<'_> {
     /// the lights chosen there and of the emitters met next, and says in `next` how the offsets stand there.
     pub fn step(
         &self,
-        vertices: &Vertices,
-        onward: &Onward,
+        room: &mut Room,
+        segment: (&Vertices, &Onward),
         active: Mask,
-        (light, scatter): (&States, &States),
+        states: (&States, &States),
         next: (&mut Level, usize),
         offsets: &mut Offsets,
     ) -> Difference {
-        let mut own = Packet::default();
-        for lane in (active & (light.apart | scatter.apart)).lanes() {
-            let place = if light.apart.get(lane) { light.place.0[lane] } else { scatter.place.0[lane] };
-            let (surfaces, materials, from) = offsets.at(self.base, place);
-            own.surfaces.copy(lane, surfaces, from);
-            own.materials.copy(lane, materials, from);
-        }
-        let lit = active & vertices.lit & light.inside;
-        let chosen = if lit.any() { chosen_light(self, vertices, &own, light, lit) } else { Lanes3::ZERO };
-        let ambient = if self.ambient { active } else { Mask::NONE };
-        let going = active & scatter.inside & vertices.scattered & (onward.exists | vertices.emits | ambient);
-        if !going.any() {
-            return Difference { light: chosen, ambient: Lanes3::ZERO };
-        }
-        let mut segment = Segment::new(self, vertices, &own, scatter, going);
-        let difference = segment.differences(self);
-        segment.go_on(self, onward, next, offsets);
-        Difference { light: chosen + difference.light, ambient: difference.ambient }
+        step(self, room, segment, active, states, next, offsets)
     }
 
+    #[inline(always)]
     fn diffuse(&self, roughness: Lanes) -> Mask {
         roughness.greater(Lanes::splat(self.threshold))
     }
@@ -142,15 +133,45 @@ impl Walk<'_> {
     }
 }
 
-/// Differences of the light of chosen emitter points.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
+fn step(
+    walk: &Walk,
+    room: &mut Room,
+    (vertices, onward): (&Vertices, &Onward),
+    active: Mask,
+    (light, scatter): (&States, &States),
+    next: (&mut Level, usize),
+    offsets: &mut Offsets,
+) -> Difference {
+    let (light_apart, apart) = (light.are(Kind::Apart), scatter.are(Kind::Apart));
+    for lane in (active & (light_apart | apart)).lanes() {
+        let place = if light_apart.get(lane) { light.place.0[lane] } else { scatter.place.0[lane] };
+        let (surfaces, materials, from) = offsets.at(walk.base, place);
+        room.own.surfaces.copy(lane, surfaces, from);
+        room.own.materials.copy(lane, materials, from);
+    }
+    let lit = active & vertices.lit & light.inside();
+    let chosen = if lit.any() { chosen_light(walk, vertices, &room.own, light, lit) } else { Lanes3::ZERO };
+    let ambient = if walk.ambient { active } else { Mask::NONE };
+    let going = active & scatter.inside() & vertices.scattered & (onward.exists | vertices.emits | ambient);
+    if !going.any() {
+        return Difference { light: chosen, ambient: Lanes3::ZERO };
+    }
+    let segment = Segment::new(walk, vertices, room, scatter, going);
+    let difference = segment.differences(walk);
+    segment.go_on(walk, onward, next, offsets);
+    Difference { light: chosen + difference.light, ambient: difference.ambient }
+}
+
+/// Differences of the light of chosen emitter points.
+#[inline(always)]
 fn chosen_light(walk: &Walk, vertices: &Vertices, own: &Packet, states: &States, active: Mask) -> Lanes3 {
     let Vertices { surfaces, materials, light, throughput, .. } = vertices;
     let scene = walk.scene;
     let base = throughput.scale(light.evals.value).scale(light.radiance);
     let of = Contributions { base, density: light.pdf + light.evals.pdf, scale: Lanes::splat(1.0) };
     let mut ends = Ends::NONE;
-    let apart = active & states.apart;
+    let apart = active & states.are(Kind::Apart);
     if apart.any() {
         let both_diffuse = walk.diffuse(materials.roughness) & walk.diffuse(own.materials.roughness);
         // An emitter's only point is lit by nothing else, whatever the materials.
@@ -162,13 +183,13 @@ fn chosen_light(walk: &Walk, vertices: &Vertices, own: &Packet, states: &States,
             ends.set(lane, extended.and_then(|found| found.end(scene, &offset, &light.points.get(lane))));
         }
     }
-    let joining = active & states.joining;
+    let joining = active & states.are(Kind::Joining);
     if joining.any() {
         let moved = materials.eval(scene, surfaces, (states.wi, light.wo), joining);
         ends.value = joining.select3(moved.value.scale(light.radiance), ends.value);
         ends.density = joining.select(light.pdf + light.points.scatter_pdf(moved.pdf), ends.density);
     }
-    let joined = states.joined;
+    let joined = states.are(Kind::Joined);
     let value = joined.select3(light.evals.value.scale(light.radiance), ends.value);
     let density = joined.select(of.density, ends.density);
     let differences = of.differences(states.prefix.throughput.scale(value), states.prefix.ratio * density);
@@ -181,31 +202,35 @@ struct Segment<'a> {
     own: &'a Packet,
     states: &'a States,
     going: Mask,
+    apart: Mask,
     /// Offsets that leave the same vertices in the same directions as their base paths: how they scatter there.
     along: Evals,
-    /// Offsets that can be connected, where both paths scatter diffusely.
+    /// Offsets apart that can be connected, where both paths scatter diffusely.
     connected: Mask,
     /// Where the others apart go by themselves.
-    extended: [Option<Extended>; LANES],
+    extended: &'a [(usize, Option<Extended>)],
 }
 
 impl<'a> Segment<'a> {
-    fn new(walk: &Walk, vertices: &'a Vertices, own: &'a Packet, states: &'a States, going: Mask) -> Self {
-        let apart = going & states.apart;
+    #[inline(always)]
+    fn new(walk: &Walk, vertices: &'a Vertices, room: &'a mut Room, states: &'a States, going: Mask) -> Self {
+        let Room { own, extended } = room;
+        let apart = going & states.are(Kind::Apart);
         let diffuse = walk.diffuse(vertices.materials.roughness) & walk.diffuse(own.materials.roughness);
         let connected = apart & diffuse & vertices.scatters.smooth();
-        let mut extended = [None; LANES];
+        extended.clear();
         for lane in (apart & !connected).lanes() {
             let (base, offset) = (vertices.surfaces.get(lane), own.surfaces.get(lane));
-            extended[lane] = walk.extend(&base, &vertices.scatters.get(lane), &offset);
+            extended.push((lane, walk.extend(&base, &vertices.scatters.get(lane), &offset)));
         }
         let along = along(walk.scene, vertices, states, going);
-        Self { vertices, own, states, going, along, connected, extended }
+        Self { vertices, own, states, going, apart, along, connected, extended }
     }
 
     /// Differences of the emitters at the segments' ends.
-    fn differences(&mut self, walk: &Walk) -> Difference {
-        let Self { vertices, own, states, going, connected, .. } = *self;
+    #[inline(always)]
+    fn differences(&self, walk: &Walk) -> Difference {
+        let Self { vertices, own, going, apart, connected, .. } = *self;
         let mut difference = Difference { light: Lanes3::ZERO, ambient: Lanes3::ZERO };
         let emits = going & vertices.emits;
         if emits.any() {
@@ -217,7 +242,7 @@ impl<'a> Segment<'a> {
             }
             let point = |lane| emission.points.get(lane);
             self.extend_ends(&mut ends, emits, |found, offset, lane| found.end(walk.scene, offset, &point(lane)));
-            difference.light = emitted(self, emits, (emission.radiance, emission.light_pdf), ends);
+            difference.light = self.emitted(emits, (emission.radiance, emission.light_pdf), ends);
         }
         if walk.ambient {
             let mut ends = Ends::NONE;
@@ -225,99 +250,119 @@ impl<'a> Segment<'a> {
             let evals = own.materials.eval(walk.scene, &own.surfaces, (own.surfaces.wi, wo), connected);
             ends.value = connected.select3(evals.value, ends.value);
             ends.density = connected.select(evals.pdf, ends.density);
-            self.extend_ends(&mut ends, going & states.apart, |found, _, _| Some(found.to_ambient()));
-            let white = (Lanes3::splat(Rgb::ONE), Lanes::ZERO);
-            difference.ambient = emitted(self, going, white, ends);
+            self.extend_ends(&mut ends, apart, |found, _, _| Some(found.to_ambient()));
+            difference.ambient = self.emitted(going, (Lanes3::splat(Rgb::ONE), Lanes::ZERO), ends);
         }
         difference
     }
 
     fn extend_ends(&self, ends: &mut Ends, of: Mask, end: impl Fn(&Extended, &Surface, usize) -> Option<End>) {
-        for lane in of.lanes() {
-            if let Some(extended) = &self.extended[lane] {
-                ends.set(lane, end(extended, &self.own.surfaces.get(lane), lane));
+        for (lane, extended) in self.extended.iter().filter(|(lane, _)| of.get(*lane)) {
+            if let Some(extended) = extended {
+                ends.set(*lane, end(extended, &self.own.surfaces.get(*lane), *lane));
             }
         }
     }
 
+    /// Differences of emitters at the segments' ends, which offsets apart receive as `ends`.
+    #[inline(always)]
+    fn emitted(&self, active: Mask, (radiance, light_pdf): (Lanes3, Lanes), ends: Ends) -> Lanes3 {
+        let Self { vertices, states, along, apart, .. } = self;
+        let scale = Lanes::splat(1.0) / vertices.survival;
+        let pdf = vertices.scatters.pdf;
+        let base = vertices.throughput.scale(vertices.scatters.weight).scale(radiance) * (pdf * scale);
+        let of = Contributions { base, density: pdf + light_pdf, scale };
+        let beside = !(*apart | states.are(Kind::Failed));
+        let value = beside.select3(along.value.scale(radiance), ends.value);
+        let density = beside.select(along.pdf + light_pdf, ends.density);
+        let differences = of.differences(states.prefix.throughput.scale(value), states.prefix.ratio * density);
+        active.select3(differences, Lanes3::ZERO)
+    }
+
     /// How the offsets stand at the next vertices.
+    #[inline(always)]
     fn go_on(&self, walk: &Walk, onward: &Onward, (next, edge): (&mut Level, usize), offsets: &mut Offsets) {
         let going = self.going & onward.exists;
-        let states = self.states;
-        let beside = Beside::new(self);
-        for lane in (going & !states.apart).lanes() {
+        let (prefix, carried) = self.beyond(self.along);
+        let carried = carried & !self.states.are(Kind::Failed);
+        for lane in (going & !self.apart).lanes() {
             let (states, to) = next.at(self.vertices.next.0[lane], edge);
-            for states in states {
-                match beside.carried.get(lane) {
-                    true => states.follow(to, beside.prefix.get(lane)),
-                    false => states.fail(to),
-                }
+            match carried.get(lane) {
+                true => states.follow(to, prefix.get(lane)),
+                false => states.fail(to),
             }
         }
-        let apart = going & states.apart;
+        let apart = going & self.apart;
         if !apart.any() {
             return;
         }
         let joins = apart & self.connected & (onward.scatter_joins | (onward.light_joins & onward.lit));
-        let joined = join(walk.scene, self, onward, joins);
-        for lane in apart.lanes() {
+        let found = Connections::new(walk.scene, self.vertices.surfaces.p, self.own, &onward.surfaces, joins);
+        let (prefix, carried) = self.beyond(Evals { value: found.value, pdf: found.pdf });
+        let joined = carried & found.possible;
+        for lane in (apart & self.connected).lanes() {
             let (states, to) = next.at(self.vertices.next.0[lane], edge);
-            let [light, scatter] = states;
-            if !self.connected.get(lane) {
-                let kept = self.extended[lane].as_ref().and_then(|extended| self.apart(lane, extended));
-                let place = kept.map(|(prefix, hit)| (prefix, offsets.push(walk.scene, walk.base.len(), &hit)));
-                for states in [light, scatter] {
-                    match place {
-                        Some((prefix, place)) => states.part(to, prefix, place),
-                        None => states.fail(to),
-                    }
-                }
-                continue;
-            }
-            for states in [&mut *light, &mut *scatter] {
-                match joined.carried.get(lane) {
-                    true => states.join(to, joined.prefix.get(lane), joined.wi.get(lane)),
-                    false => states.fail(to),
-                }
-            }
-            // The next vertex is joined, unless it is glossy itself.
-            let light_apart = onward.lit.get(lane) && !onward.light_joins.get(lane);
-            let scatter_apart = onward.scattered.get(lane) && !onward.scatter_joins.get(lane);
-            if light_apart || scatter_apart {
-                let (light, scatter) = (light_apart.then_some(light), scatter_apart.then_some(scatter));
-                self.go_on_apart(walk, lane, (light, scatter, to), offsets);
+            match joined.get(lane) {
+                true => states.join(to, prefix.get(lane), found.wi.get(lane)),
+                false => states.fail(to),
             }
         }
+        self.go_on_apart(walk, onward, (next, edge), offsets);
     }
 
-    /// An offset goes on by itself although both paths scatter diffusely, as the next vertex of the base path is glossy.
-    fn go_on_apart(
-        &self,
-        walk: &Walk,
-        lane: usize,
-        (light, scatter, to): (Option<&mut States>, Option<&mut States>, usize),
-        offsets: &mut Offsets,
-    ) {
-        let (base, offset) = (self.vertices.surfaces.get(lane), self.own.surfaces.get(lane));
-        let extended = walk.extend(&base, &self.vertices.scatters.get(lane), &offset);
-        let next_lobe = walk.below[self.vertices.next.0[lane] as usize / LANES]
-            .scatters
-            .get(self.vertices.next.0[lane] as usize % LANES)
-            .lobe;
-        let place = extended.as_ref().and_then(|extended| {
-            let (prefix, hit) = self.apart(lane, extended)?;
-            Some((prefix, offsets.push(walk.scene, walk.base.len(), &hit), hit))
-        });
-        for (states, lobe) in [(light, Lobe::Smooth), (scatter, next_lobe)] {
-            let Some(states) = states else { continue };
+    /// Prefixes behind the segments, over which offsets scatter so, and which carry anything.
+    #[inline(always)]
+    fn beyond(&self, offset: Evals) -> (Prefixes, Mask) {
+        let pdf = self.vertices.scatters.pdf;
+        let inverse = Lanes::splat(1.0) / (pdf * self.vertices.survival);
+        self.states.prefix.extended(offset.value * inverse, offset.pdf / pdf)
+    }
+
+    /// Offsets apart that stay so: those that are not connected, and those of which the base path's next vertex is glossy
+    /// itself.
+    fn go_on_apart(&self, walk: &Walk, onward: &Onward, (next, edge): (&mut Level, usize), offsets: &mut Offsets) {
+        for (lane, extended) in self.extended.iter().filter(|(lane, _)| onward.exists.get(*lane)) {
+            let kept = extended.as_ref().and_then(|extended| self.apart(*lane, extended));
+            let place = kept.map(|(prefix, hit)| (prefix, offsets.push(walk.scene, walk.base.len(), &hit)));
+            let (states, to) = next.at(self.vertices.next.0[*lane], edge);
+            match place {
+                Some((prefix, place)) => states.part(to, prefix, place),
+                None => states.fail(to),
+            }
+        }
+        let light_apart = onward.lit & !onward.light_joins;
+        let scatter_apart = onward.scattered & !onward.scatter_joins;
+        for lane in (self.going & onward.exists & self.connected & (light_apart | scatter_apart)).lanes() {
+            let place = self.vertices.next.0[lane];
+            let (base, offset) = (self.vertices.surfaces.get(lane), self.own.surfaces.get(lane));
+            let extended = walk.extend(&base, &self.vertices.scatters.get(lane), &offset);
+            let kept = extended.as_ref().and_then(|extended| {
+                let (prefix, hit) = self.apart(lane, extended)?;
+                Some((prefix, offsets.push(walk.scene, walk.base.len(), &hit), hit))
+            });
             // Where the offset's own new vertex is diffuse, the way back would have joined it: there is none.
-            let joinable = |hit: &Surface| {
+            let joinable = |hit: &Surface, lobe: Lobe| {
                 let roughness = walk.scene.bsdf(hit).roughness(hit);
                 lobe == Lobe::Smooth && roughness.is_some_and(|roughness| roughness > walk.threshold)
             };
-            match &place {
-                Some((prefix, place, hit)) if !joinable(hit) => states.part(to, *prefix, *place),
+            let stand = |(states, to): (&mut States, usize), lobe| match &kept {
+                Some((prefix, place, hit)) if !joinable(hit, lobe) => states.part(to, *prefix, *place),
                 _ => states.fail(to),
+            };
+            match (light_apart.get(lane), scatter_apart.get(lane)) {
+                (true, false) => {
+                    let joined = next.at(place, edge).0.clone();
+                    let (continued, to) = next.continued_at(place, edge);
+                    continued.copy(to, &joined);
+                    stand(next.at(place, edge), Lobe::Smooth);
+                }
+                (both, _) => {
+                    if both {
+                        stand(next.at(place, edge), Lobe::Smooth);
+                    }
+                    let there = &walk.below[place as usize / LANES].scatters;
+                    stand(next.continued_at(place, edge), there.get(place as usize % LANES).lobe);
+                }
             }
         }
     }
@@ -332,64 +377,15 @@ impl<'a> Segment<'a> {
 }
 
 /// How offsets scatter that leave the same vertices in the same directions as their base paths.
-#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
+#[inline(always)]
 fn along(scene: &Scene, vertices: &Vertices, states: &States, going: Mask) -> Evals {
     let Vertices { surfaces, materials, scatters, .. } = vertices;
     let mut along = Evals { value: scatters.weight * scatters.pdf, pdf: scatters.pdf };
-    let joining = going & states.joining;
+    let joining = going & states.are(Kind::Joining);
     if joining.any() {
         let moved = materials.eval(scene, surfaces, (states.wi, scatters.wo), joining);
         along.value = joining.select3(moved.value, along.value);
         along.pdf = joining.select(moved.pdf, along.pdf);
     }
     along
-}
-
-/// Differences of emitters at the segments' ends, which offsets apart receive as `ends`.
-#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-fn emitted(segment: &Segment, active: Mask, (radiance, light_pdf): (Lanes3, Lanes), ends: Ends) -> Lanes3 {
-    let Segment { vertices, states, along, .. } = segment;
-    let scale = Lanes::splat(1.0) / vertices.survival;
-    let pdf = vertices.scatters.pdf;
-    let base = vertices.throughput.scale(vertices.scatters.weight).scale(radiance) * (pdf * scale);
-    let of = Contributions { base, density: pdf + light_pdf, scale };
-    let beside = states.joining | states.joined;
-    let value = beside.select3(along.value.scale(radiance), ends.value);
-    let density = beside.select(along.pdf + light_pdf, ends.density);
-    let differences = of.differences(states.prefix.throughput.scale(value), states.prefix.ratio * density);
-    active.select3(differences, Lanes3::ZERO)
-}
-
-/// Prefixes behind a segment, and which carry anything.
-struct Beside {
-    prefix: Prefixes,
-    carried: Mask,
-    wi: Lanes3,
-}
-
-impl Beside {
-    /// Of offsets that follow their base paths.
-    fn new(segment: &Segment) -> Self {
-        follow(segment)
-    }
-}
-
-#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-fn follow(segment: &Segment) -> Beside {
-    let Segment { vertices, states, along, .. } = segment;
-    let pdf = vertices.scatters.pdf;
-    let inverse = Lanes::splat(1.0) / (pdf * vertices.survival);
-    let (prefix, carried) = states.prefix.extended(along.value * inverse, along.pdf / pdf);
-    Beside { prefix, carried: carried & (states.joining | states.joined), wi: Lanes3::ZERO }
-}
-
-/// Prefixes of offsets that are connected to their base paths' next vertices.
-#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-fn join(scene: &Scene, segment: &Segment, onward: &Onward, joins: Mask) -> Beside {
-    let Segment { vertices, own, states, .. } = segment;
-    let found = Connections::new(scene, vertices.surfaces.p, own, &onward.surfaces, joins);
-    let pdf = vertices.scatters.pdf;
-    let inverse = Lanes::splat(1.0) / (pdf * vertices.survival);
-    let (prefix, carried) = states.prefix.extended(found.value * inverse, found.pdf / pdf);
-    Beside { prefix, carried: carried & found.possible, wi: found.wi }
 }
