@@ -2,67 +2,73 @@
 
 use super::{Vec2, vec2};
 
-/// A distribution over indices by inversion of its cumulative sum; f64 sums, so that a million entries keep
-/// their shares.
+/// A distribution over indices by inversion of its cumulative sum, which keeps numbers that are close together on indices
+/// that are. Sums are 32-bit shares of the total: indices of less than that are never drawn, and their probability says so.
 #[derive(Clone, Debug)]
 pub struct Discrete {
     /// Running sums, starting with 0 and ending with the total.
-    cumulative: Vec<f64>,
-    /// The index that the start of each of as many equal parts of the total falls on, so that searches are short.
+    cumulative: Vec<u32>,
+    /// The index that the start of each of some equal parts of the total falls on, so that searches are short.
     guide: Vec<u32>,
+    total: f64,
 }
+
+/// Indices a part of the guide, on average.
+const PART: usize = 8;
 
 impl Discrete {
     /// Weights must be finite and not negative. `None` when they sum to zero.
-    pub fn new(weights: impl IntoIterator<Item = f32>) -> Option<Self> {
-        let mut cumulative = vec![0.0];
-        let mut total = 0.0;
-        for weight in weights {
-            total += f64::from(weight);
-            cumulative.push(total);
-        }
+    pub fn new(weights: impl IntoIterator<Item = f32> + Clone) -> Option<Self> {
+        let total: f64 = weights.clone().into_iter().map(f64::from).sum();
         if !(total > 0.0 && total.is_finite()) {
             return None;
         }
+        let mut cumulative = vec![0];
+        let mut sum = 0.0;
+        for weight in weights {
+            sum += f64::from(weight);
+            cumulative.push((sum / total * f64::from(u32::MAX)) as u32);
+        }
         let n = cumulative.len() - 1;
+        cumulative[n] = u32::MAX;
+        let parts = n.div_ceil(PART);
         let start = |part: usize| {
-            let target = part as f64 / n as f64 * total;
+            let target = (part as f64 / parts as f64 * f64::from(u32::MAX)) as u32;
             cumulative.partition_point(|&sum| sum <= target).saturating_sub(1).min(n - 1) as u32
         };
-        let guide = (0..n).map(start).collect();
-        Some(Self { cumulative, guide })
+        let guide = (0..parts).map(start).collect();
+        Some(Self { cumulative, guide, total })
     }
 
     /// Sum of all weights.
     pub fn total(&self) -> f64 {
-        self.cumulative[self.cumulative.len() - 1]
+        self.total
     }
 
     /// The index that `u` in [0, 1) falls on, and `u` stretched to [0, 1) within it for further use.
     #[inline]
     pub fn sample(&self, u: f32) -> (usize, f32) {
-        let target = f64::from(u) * self.total();
-        let last = self.guide.len() - 1;
-        let mut index = self.guide[((u * self.guide.len() as f32) as usize).min(last)] as usize;
+        // 2^-32 of the total is missing at the end.
+        let target = (f64::from(u) * f64::from(u32::MAX)) as u32;
+        let last = self.cumulative.len() - 2;
+        let part = ((u * self.guide.len() as f32) as usize).min(self.guide.len() - 1);
+        let mut index = self.guide[part] as usize;
         while index < last && self.cumulative[index + 1] <= target {
             index += 1;
         }
-        // Parts are found in floats, which may round up.
-        while index > 0 && self.cumulative[index] > target {
-            index -= 1;
-        }
-        // Rounding may end on an entry without weight, beside the one that was meant.
-        while index > 0 && self.cumulative[index + 1] == self.cumulative[index] {
+        // Parts are found in floats, which may round up; and an entry without weight may stand beside the one meant.
+        while index > 0 && (self.cumulative[index] > target || self.cumulative[index + 1] == self.cumulative[index]) {
             index -= 1;
         }
         let (low, high) = (self.cumulative[index], self.cumulative[index + 1]);
-        let rest = if high > low { (target - low) / (high - low) } else { 0.0 };
-        (index, (rest as f32).clamp(0.0, 1.0 - f32::EPSILON / 2.0))
+        let rest = if high > low { (target.saturating_sub(low)) as f32 / (high - low) as f32 } else { 0.0 };
+        (index, rest.clamp(0.0, 1.0 - f32::EPSILON / 2.0))
     }
 
     /// Probability of `index`.
+    #[inline]
     pub fn probability(&self, index: usize) -> f32 {
-        ((self.cumulative[index + 1] - self.cumulative[index]) / self.total()) as f32
+        (self.cumulative[index + 1] - self.cumulative[index]) as f32 * (1.0 / u32::MAX as f32)
     }
 }
 

@@ -1,4 +1,4 @@
-//! Waves of tiles on all threads, until the samples or the time are used up or someone says stop.
+//! Rounds of tiles on all threads, until the samples or the time are used up or someone says stop.
 
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -7,7 +7,8 @@ use std::time::{Duration, Instant};
 use rayon::prelude::*;
 
 use super::gradient::shift::Shift;
-use super::{SampleId, wave};
+use super::SampleId;
+use super::wave::Wave;
 use crate::film::{Film, Needs, Rejected, Sample, TILE, Tile};
 use crate::scene::Scene;
 
@@ -66,21 +67,21 @@ impl Outcome {
     }
 }
 
-/// Samples that a wave adds to every pixel: few enough for progress and for stopping in time.
-const WAVE: u32 = 8;
+/// Samples that a round adds to every pixel: few enough for progress and for stopping in time.
+const ROUND: u32 = 8;
 
 /// Renders until the budget is used up.
 pub fn render(scene: &Scene, settings: Settings, control: &Control) -> Outcome {
     let start = Instant::now();
     let mut outcome = Outcome::new(scene, settings.needs);
-    while let Some(wave) = next_wave(settings.budget, outcome.spp, start.elapsed()) {
+    while let Some(round) = next_round(settings.budget, outcome.spp, start.elapsed()) {
         let done = outcome.spp;
         let progress = |share: f32| match settings.budget {
-            Budget::Spp(spp) => (control.progress)((done as f32 + wave as f32 * share) / spp as f32),
+            Budget::Spp(spp) => (control.progress)((done as f32 + round as f32 * share) / spp as f32),
             Budget::Time(limit) => (control.progress)(start.elapsed().as_secs_f32() / limit.as_secs_f32()),
         };
-        run_wave(scene, settings, &Control { stop: control.stop, progress: &progress }, &mut outcome, &|_, _| wave);
-        outcome.spp += wave;
+        run_round(scene, settings, &Control { stop: control.stop, progress: &progress }, &mut outcome, &|_, _| round);
+        outcome.spp += round;
         outcome.stopped = control.stop.load(Ordering::Relaxed);
         if outcome.stopped {
             break;
@@ -94,40 +95,41 @@ pub fn render(scene: &Scene, settings: Settings, control: &Control) -> Outcome {
 pub fn add(scene: &Scene, settings: Settings, control: &Control, outcome: &mut Outcome, counts: &[u32]) {
     let start = Instant::now();
     let width = outcome.film.width;
-    run_wave(scene, settings, control, outcome, &|x, y| counts[y * width + x]);
+    run_round(scene, settings, control, outcome, &|x, y| counts[y * width + x]);
     outcome.spp = outcome.film.most_samples();
     outcome.stopped = control.stop.load(Ordering::Relaxed);
     outcome.elapsed += start.elapsed();
 }
 
-/// Samples per pixel of the next wave, none when the budget is used up. A time budget is met by the waves' own
+/// Samples per pixel of the next round, none when the budget is used up. A time budget is met by the rounds' own
 /// mean speed: the last ones shrink so as not to overshoot.
-fn next_wave(budget: Budget, done: u32, elapsed: Duration) -> Option<u32> {
+fn next_round(budget: Budget, done: u32, elapsed: Duration) -> Option<u32> {
     match budget {
-        Budget::Spp(spp) => Some(WAVE.min(spp.saturating_sub(done))).filter(|&wave| wave > 0),
+        Budget::Spp(spp) => Some(ROUND.min(spp.saturating_sub(done))).filter(|&round| round > 0),
         Budget::Time(_) if done == 0 => Some(1),
         Budget::Time(limit) => {
             let per_sample = elapsed.as_secs_f64() / f64::from(done);
             let left = limit.as_secs_f64() - elapsed.as_secs_f64();
             let affordable = (left / per_sample + 0.5) as u32;
-            Some(affordable.min(WAVE).min(done)).filter(|&wave| wave > 0)
+            Some(affordable.min(ROUND).min(done)).filter(|&round| round > 0)
         }
     }
 }
 
-/// Number of samples that a wave adds to the pixel in a column and row.
-type Wave<'a> = &'a (dyn Fn(usize, usize) -> u32 + Sync);
+/// Number of samples that a round adds to the pixel in a column and row.
+type Counts<'a> = &'a (dyn Fn(usize, usize) -> u32 + Sync);
 
-/// Adds a wave; `control.progress` is told the share of it.
-fn run_wave(scene: &Scene, settings: Settings, control: &Control, outcome: &mut Outcome, wave: Wave) {
+/// Adds a round; `control.progress` is told the share of it.
+fn run_round(scene: &Scene, settings: Settings, control: &Control, outcome: &mut Outcome, counts: Counts) {
     let first_rejected = Mutex::new(outcome.first_rejected);
     let tiles = outcome.film.tiles_mut();
     let (total, done) = (tiles.len(), Mutex::new(0));
-    tiles.par_iter_mut().for_each(|tile| {
+    let wave_of = || Wave::new(scene, settings.needs, settings.shift);
+    tiles.par_iter_mut().for_each_init(wave_of, |wave, tile| {
         if control.stop.load(Ordering::Relaxed) {
             return;
         }
-        if let Some(rejected) = run_tile(scene, settings, tile, wave) {
+        if let Some(rejected) = run_tile(settings, wave, tile, counts) {
             let mut first = first_rejected.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
             first.get_or_insert(rejected);
         }
@@ -138,8 +140,7 @@ fn run_wave(scene: &Scene, settings: Settings, control: &Control, outcome: &mut 
     outcome.first_rejected = first_rejected.into_inner().unwrap_or_else(|poisoned| poisoned.into_inner());
 }
 
-fn run_tile(scene: &Scene, settings: Settings, tile: &mut Tile, counts: Wave) -> Option<(SampleId, Rejected)> {
-    let mut wave = wave::Wave::new(scene, settings.needs, settings.shift);
+fn run_tile(settings: Settings, wave: &mut Wave, tile: &mut Tile, counts: Counts) -> Option<(SampleId, Rejected)> {
     let mut first_rejected = None;
     let at = |pixel: usize, tile: &Tile| (tile.x + pixel % tile.width, tile.y + pixel / tile.width);
     // Samples of one number are traced together, whatever number a pixel begins with.
@@ -172,7 +173,7 @@ pub fn sample(scene: &Scene, id: SampleId, shift: Shift) -> Sample {
     let (x, y) = (id.x / TILE * TILE, id.y / TILE * TILE);
     let (width, height) = (TILE.min(scene.sensor().width - x), TILE.min(scene.sensor().height - y));
     let pixels: Vec<_> = (0..width * height).map(|pixel| (x + pixel % width, y + pixel / width)).collect();
-    wave::Wave::new(scene, all, shift).trace(id.seed, id.index, &pixels)[(id.y - y) * width + id.x - x]
+    Wave::new(scene, all, shift).trace(id.seed, id.index, &pixels)[(id.y - y) * width + id.x - x]
 }
 
 #[cfg(test)]
@@ -180,16 +181,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn waves_add_up_to_the_samples_and_stay_within_the_time() {
+    fn rounds_add_up_to_the_samples_and_stay_within_the_time() {
         let mut done = 0;
-        while let Some(wave) = next_wave(Budget::Spp(21), done, Duration::ZERO) {
-            done += wave;
+        while let Some(round) = next_round(Budget::Spp(21), done, Duration::ZERO) {
+            done += round;
         }
         assert_eq!(done, 21);
         let limit = Budget::Time(Duration::from_secs(10));
-        assert_eq!(next_wave(limit, 0, Duration::from_secs(60)), Some(1));
-        assert_eq!(next_wave(limit, 4, Duration::from_secs(4)), Some(4));
-        assert_eq!(next_wave(limit, 9, Duration::from_secs(9)), Some(1));
-        assert_eq!(next_wave(limit, 10, Duration::from_secs(10)), None);
+        assert_eq!(next_round(limit, 0, Duration::from_secs(60)), Some(1));
+        assert_eq!(next_round(limit, 4, Duration::from_secs(4)), Some(4));
+        assert_eq!(next_round(limit, 9, Duration::from_secs(9)), Some(1));
+        assert_eq!(next_round(limit, 10, Duration::from_secs(10)), None);
     }
 }

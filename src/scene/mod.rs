@@ -226,7 +226,8 @@ impl Scene {
 
     /// The environment as seen along `direction`, if there is one.
     pub fn environment(&self, direction: Vec3) -> Option<LightPoint> {
-        Some(LightPoint::at_infinity(direction, self.environment?))
+        let emitter = self.environment?;
+        Some(LightPoint { emitter, ..self.emitters[emitter as usize].around(direction) })
     }
 
     /// The camera.

@@ -10,7 +10,7 @@ use crate::math::{Mat4, Rgb, Vec2, Vec3, luminance, vec2, vec3};
 use crate::scene::Bounds;
 use crate::scene::load::props::Object;
 use crate::scene::load::{Loader, Plugin};
-use crate::scene::texture::Texels;
+use crate::scene::texture::{self, Texels};
 
 /// `envmap`.
 pub const PLUGIN: Plugin<Box<dyn Emitter>> =
@@ -75,9 +75,15 @@ impl EnvMap {
         let (x, y) = (at.x.floor(), (at.y as usize).min(height - 2));
         let wrap = |x: f32| (x as i64).rem_euclid(width as i64) as usize;
         let (left, right) = (wrap(x), wrap(x + 1.0));
-        let row = |y| self.texels.texel(left, y, false).lerp(self.texels.texel(right, y, false), at.x - x);
-        row(y).lerp(row(y + 1), at.y - y as f32) * self.scale
+        let [a, b, c, d] = self.texels.square([left, right], [y, y + 1], false);
+        a.lerp(b, at.x - x).lerp(c.lerp(d, at.x - x), at.y - y as f32) * self.scale
     }
+}
+
+/// A point of the environment knows its place in the image: it is looked up more than once.
+fn far(direction: Vec3, uv: Vec2) -> LightPoint {
+    let at = texture::Point { uv, ..texture::Point::default() };
+    LightPoint { at, ..LightPoint::at_infinity(direction, 0) }
 }
 
 impl Emitter for EnvMap {
@@ -86,19 +92,23 @@ impl Emitter for EnvMap {
         let (sin_phi, cos_phi) = (TAU * uv.x).sin_cos();
         let (sin, cos) = (PI * uv.y).sin_cos();
         let direction = self.to_world.transform_vector3(vec3(sin_phi * sin, cos, -cos_phi * sin));
-        Some(LightPoint::at_infinity(direction.normalize(), 0))
+        Some(far(direction.normalize(), uv))
+    }
+
+    fn around(&self, direction: Vec3) -> LightPoint {
+        far(direction, self.uv(direction))
     }
 
     fn pdf(&self, _from: Vec3, point: &LightPoint) -> f32 {
-        let (Position::Infinity { direction }, Some(grid)) = (point.position, &self.grid) else { return 0.0 };
-        let uv = self.uv(direction);
+        let (Position::Infinity { .. }, Some(grid)) = (point.position, &self.grid) else { return 0.0 };
+        let uv = point.at.uv;
         let sine = (PI * uv.y).sin().max(1e-6);
         grid.pdf(uv) / (2.0 * PI * PI * sine)
     }
 
     fn radiance(&self, point: &LightPoint, _direction: Vec3) -> Rgb {
         match point.position {
-            Position::Infinity { direction } => self.look_up(self.uv(direction)),
+            Position::Infinity { .. } => self.look_up(point.at.uv),
             Position::Surface { .. } | Position::Point { .. } => Rgb::ZERO,
         }
     }

@@ -133,6 +133,12 @@ pub trait Emitter: Send + Sync {
     /// Told once what the emitter lights, for those that surround it.
     fn enclose(&mut self, _scene: Bounds) {}
 
+    /// The point that a ray ends on which meets nothing, for those that surround the scene; its emitter number is left to
+    /// the scene.
+    fn around(&self, direction: Vec3) -> LightPoint {
+        LightPoint::at_infinity(direction, 0)
+    }
+
     /// Whether rays that meet nothing end on it.
     fn is_environment(&self) -> bool {
         false

@@ -88,9 +88,7 @@ impl Bitmap {
         let corner = at.floor();
         let (x, y) = (corner.x as i64, corner.y as i64);
         let wrap = |index: i64, size| [index, index.saturating_add(1)].map(|index| self.wrap.apply(index, size));
-        let ([left, right], [above, below]) = (wrap(x, self.texels.width), wrap(y, self.texels.height));
-        let texel = |x, y| self.texels.texel(x, y, self.raw);
-        let texels = [texel(left, above), texel(right, above), texel(left, below), texel(right, below)];
+        let texels = self.texels.square(wrap(x, self.texels.width), wrap(y, self.texels.height), self.raw);
         Footprint { texels, fraction: at - corner }
     }
 

@@ -107,6 +107,28 @@ impl Texels {
     }
 }
 
+impl Texels {
+    /// Linear colours of the texels in two columns of two rows.
+    #[inline]
+    pub fn square(&self, [left, right]: [usize; 2], [above, below]: [usize; 2], raw: bool) -> [Rgb; 4] {
+        let (above, below) = (above * self.width, below * self.width);
+        let places = [above + left, above + right, below + left, below + right];
+        match &self.samples {
+            Samples::Float(texels) => places.map(|place| texels[place]),
+            Samples::Byte(texels) => {
+                let table = decoded(raw);
+                places.map(|place| {
+                    let [r, g, b] = texels[place];
+                    vec3(table[r as usize], table[g as usize], table[b as usize])
+                })
+            }
+            Samples::Cached { .. } => {
+                places.map(|place| self.texel(place % self.width, place / self.width, raw))
+            }
+        }
+    }
+}
+
 /// A texel that is not a number would poison every path that meets it.
 fn finite(color: Rgb) -> Rgb {
     Rgb::from_array(color.to_array().map(|value| if value.is_finite() { value } else { 0.0 }))
@@ -114,14 +136,20 @@ fn finite(color: Rgb) -> Rgb {
 
 #[inline]
 fn decode([r, g, b]: [u8; 3], raw: bool) -> Rgb {
+    let table = decoded(raw);
+    vec3(table[r as usize], table[g as usize], table[b as usize])
+}
+
+/// Linear values of all bytes.
+#[inline]
+fn decoded(raw: bool) -> &'static [f32; 256] {
     static LINEAR: OnceLock<[f32; 256]> = OnceLock::new();
     static SRGB: OnceLock<[f32; 256]> = OnceLock::new();
-    let table = if raw {
+    if raw {
         LINEAR.get_or_init(|| std::array::from_fn(|i| i as f32 / 255.0))
     } else {
         SRGB.get_or_init(|| std::array::from_fn(|i| srgb_decode(i as f32 / 255.0)))
-    };
-    vec3(table[r as usize], table[g as usize], table[b as usize])
+    }
 }
 
 #[cfg(test)]
