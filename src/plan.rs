@@ -26,29 +26,20 @@ pub struct Plan {
 impl Plan {
     /// Decides for a method's needs and what is to be saved besides.
     pub fn new(scene: &Scene, method: Needs, saved: Needs) -> Self {
-        let lit = !scene.emitters().is_empty();
         let wanted = method.union(saved);
-        let needs = Needs { edges: wanted.edges && lit && scene.integrator().max_depth > 1, ..wanted };
-        let reason = |by_method: bool, by_saving: bool| match (by_method, by_saving) {
-            (true, _) => "the method needs them".to_owned(),
-            (_, true) => "they are to be saved".to_owned(),
-            _ => "neither the method nor the saved layers need them".to_owned(),
-        };
-        let gradients = match (wanted.edges, needs.edges) {
-            (true, false) if !lit => "nothing in the scene emits light".to_owned(),
-            (true, false) => "the path depth leaves only emitters seen directly".to_owned(),
-            _ => reason(method.edges, saved.edges),
-        };
-        let item = |what, computed, reason| Item { what, computed, reason };
-        let items = vec![
-            item("gradients", needs.edges, gradients),
-            item("features", needs.features, reason(method.features, saved.features)),
-            item("bins", needs.bins, reason(method.bins, saved.bins)),
-            item("occlusion", needs.occlusion, reason(method.occlusion, saved.occlusion)),
-            item("position", needs.position, reason(method.position, saved.position)),
-            item("ambient", needs.ambient, reason(method.ambient, saved.ambient)),
-        ];
+        let needs = Needs { edges: wanted.edges && edges_differ(scene).is_ok(), ..wanted };
+        let mut items = of_film(scene, method, saved, needs);
+        items.extend(of_scene(scene, needs));
         Self { needs, items }
+    }
+
+    /// Leaves nothing out, for comparison: the scene is to be [generalized](Scene::generalize) as well.
+    pub fn all(scene: &Scene) -> Self {
+        let mut plan = Self::new(scene, Needs::ALL, Needs::default());
+        for item in &mut plan.items {
+            (item.computed, item.reason) = (true, "everything is asked for".to_owned());
+        }
+        Self { needs: Needs::ALL, ..plan }
     }
 
     /// One line: `+gradients -features -bins`.
@@ -56,4 +47,76 @@ impl Plan {
         let sign = |item: &Item| if item.computed { '+' } else { '-' };
         self.items.iter().map(|item| format!("{}{}", sign(item), item.what)).collect::<Vec<_>>().join(" ")
     }
+}
+
+/// Whether neighbouring pixels can differ in light that is scattered; why not, else.
+fn edges_differ(scene: &Scene) -> Result<(), &'static str> {
+    if scene.emitters().is_empty() {
+        return Err("nothing in the scene emits light");
+    }
+    match scene.integrator().max_depth {
+        0 | 1 => Err("the path depth leaves only emitters seen directly"),
+        _ => Ok(()),
+    }
+}
+
+/// What the film records.
+fn of_film(scene: &Scene, method: Needs, saved: Needs, needs: Needs) -> Vec<Item> {
+    let item = |what, computed, by_method: bool, by_saving: bool| {
+        let reason = match (by_method, by_saving) {
+            (true, _) => "the method needs them",
+            (_, true) => "they are to be saved",
+            _ => "neither the method nor the saved layers need them",
+        };
+        Item { what, computed, reason: reason.to_owned() }
+    };
+    let mut gradients = item("gradients", needs.edges, method.edges, saved.edges);
+    if let (true, Err(reason)) = (method.edges || saved.edges, edges_differ(scene)) {
+        gradients.reason = reason.to_owned();
+    }
+    vec![
+        gradients,
+        item("features", needs.features, method.features, saved.features),
+        item("bins", needs.bins, method.bins, saved.bins),
+        item("occlusion", needs.occlusion, method.occlusion, saved.occlusion),
+        item("position", needs.position, method.position, saved.position),
+        item("ambient", needs.ambient, method.ambient, saved.ambient),
+    ]
+}
+
+/// What tracing the scene takes.
+fn of_scene(scene: &Scene, needs: Needs) -> Vec<Item> {
+    let census = scene.census();
+    let item = |what, computed, reason: String| Item { what, computed, reason };
+    let of_shapes = |count: usize, what: &str| format!("{count} of {} shapes {what}", census.shapes);
+    let (others, lens) = (census.shapes - census.diffuse, scene.sensor().has_lens());
+    let half_vectors = match (needs.edges, others) {
+        (false, _) => "without gradients no path is shifted".to_owned(),
+        (_, 0) => "every material is diffuse: offsets always join their base paths".to_owned(),
+        _ => of_shapes(others, "may have lobes that are no wider than a mirror's"),
+    };
+    let camera_rays = match (needs.edges, lens) {
+        (false, _) => "without gradients there are no offsets",
+        (_, true) => "pixels look from different points of the lens",
+        _ => "through a pinhole offsets begin as their neighbours' own paths",
+    };
+    let hidden = scene.integrator().hide_emitters;
+    vec![
+        item("materials", others > 0, of_shapes(others, "have a material to be asked ray by ray")),
+        item("textures", census.textured > 0, of_shapes(census.textured, "need texture coordinates")),
+        item("derivatives", census.bent > 0, of_shapes(census.bent, "have a material that bends normals")),
+        item(
+            "emitters",
+            census.glowing < census.emitters,
+            format!("{} of {} emitters are meshes that glow evenly", census.glowing, census.emitters),
+        ),
+        item(
+            "environment",
+            scene.has_environment(),
+            if scene.has_environment() { "light comes from all around" } else { "nothing surrounds the scene" }.into(),
+        ),
+        item("direct", !hidden, if hidden { "emitters are hidden" } else { "the camera may see emitters" }.into()),
+        item("half-vectors", needs.edges && others > 0, half_vectors),
+        item("offset-rays", needs.edges && lens, camera_rays.to_owned()),
+    ]
 }

@@ -4,6 +4,7 @@ mod common;
 
 use common::{ALL, bundled, film, sensor};
 use fluxion::film::{Layer, Needs, exr as layers};
+use fluxion::plan::Plan;
 
 fn on_threads(threads: usize) -> fluxion::film::Film {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
@@ -73,6 +74,41 @@ fn half_of_the_directions_are_open_beside_a_wall_and_all_of_them_in_the_open() {
         // The camera looks at the origin, from five units away; rays start a little before it.
         assert!(frame.get(Layer::Position).unwrap().data.iter().all(|value| value.abs() < 0.01));
         assert!(frame.get(Layer::Depth).unwrap().data.iter().all(|depth| (depth - 5.0).abs() < 0.02));
+    }
+}
+
+#[test]
+fn what_is_left_out_changes_no_bit_of_what_is_not() {
+    let names = ["cornell-box", "unit/rough-plastic", "unit/dielectric", "unit/bump", "unit/environment", "unit/lens"];
+    for name in names.into_iter().chain(["unit/instances", "unit/mask", "unit/sphere-light"]) {
+        let mut scene = bundled(name, (24, 18));
+        let (paths, edges) = (Needs::default(), Needs { edges: true, ..Needs::default() });
+        let planned = [paths, edges].map(|needs| film(&scene, 9, 3, needs).develop());
+        scene.generalize();
+        let all = film(&scene, 9, 3, Plan::all(&scene).needs).develop();
+        for planned in planned {
+            for layer in Layer::all().filter(|&layer| planned.get(layer).is_some()) {
+                assert_eq!(planned.get(layer), all.get(layer), "{name} {layer:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn the_plan_says_what_a_scene_can_do_without() {
+    let computed = |name: &str, what: &str| {
+        let plan = Plan::new(&bundled(name, (8, 6)), Needs { edges: true, ..Needs::default() }, Needs::default());
+        plan.items.iter().find(|item| item.what == what).unwrap().computed
+    };
+    for (what, without, with) in [
+        ("materials", "unit/diffuse", "unit/rough-plastic"),
+        ("half-vectors", "unit/diffuse", "unit/dielectric"),
+        ("derivatives", "unit/diffuse", "unit/bump"),
+        ("environment", "unit/diffuse", "unit/environment"),
+        ("offset-rays", "unit/diffuse", "unit/lens"),
+        ("emitters", "cornell-box", "unit/sphere-light"),
+    ] {
+        assert_eq!((computed(without, what), computed(with, what)), (false, true), "{what}");
     }
 }
 

@@ -6,8 +6,8 @@ mod common;
 use common::{ALL, bundled, check_zero, film, shifted_film};
 use fluxion::film::{Layer, Needs};
 use fluxion::image::Image;
-use fluxion::math::{Vec3, rng, vec2, vec3};
 use fluxion::math::lanes::Lanes3;
+use fluxion::math::{Vec3, rng, vec2, vec3};
 use fluxion::render::gradient::shift::{Shift, half_vector, reconnect};
 
 /// Independent pairs of a gradient render and a path-traced one.

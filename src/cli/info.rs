@@ -133,7 +133,7 @@ fn describe(scene: &Scene, method: &str) -> Result<()> {
     let needs = reconstruct::parse(method)?.needs();
     for item in Plan::new(scene, needs, Needs::default()).items {
         let verb = if item.computed { "computed" } else { "left out" };
-        println!("  {:<10} {verb}: {}", item.what, item.reason);
+        println!("  {:<12} {verb}: {}", item.what, item.reason);
     }
     Ok(())
 }

@@ -65,6 +65,9 @@ pub struct Args {
     /// Record what an ambient light would add in the layers, by which `feature:ambient` sees what no path has lit
     #[arg(long, requires = "layers")]
     ambient: bool,
+    /// What to compute: what the scene, the method and the layers need, or everything, to see what that saves
+    #[arg(long, default_value = "needed", value_enum, value_name = "WHAT")]
+    plan: Planned,
     /// JSON file for times, samples, memory and what was left out
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
@@ -88,6 +91,15 @@ pub struct Args {
     quiet: bool,
 }
 
+/// What is computed.
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum Planned {
+    /// What is needed.
+    Needed,
+    /// Everything that can be.
+    All,
+}
+
 fn parse_sample(text: &str) -> Result<(usize, usize, u32), String> {
     let parts: Vec<_> = text.split(',').map(str::trim).collect();
     let error = || "a sample is written X,Y,S, as in 10,20,3".to_owned();
@@ -109,7 +121,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let texture_memory = args.texture_memory << 20;
     let options =
         load::Options { parameters: args.define.clone(), size: args.size, threads: args.threads, texture_memory };
-    let scene = load::load(&args.scene, &options)?;
+    let mut scene = load::load(&args.scene, &options)?;
     stats.seconds.load = start.elapsed().as_secs_f64();
     if scene.emitters().is_empty() {
         eprintln!("warning: nothing in {} emits light: the image is black", args.scene.display());
@@ -125,7 +137,13 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         },
         None => Needs::default(),
     };
-    let plan = Plan::new(&scene, method.needs(), saved);
+    let plan = match args.plan {
+        Planned::Needed => Plan::new(&scene, method.needs(), saved),
+        Planned::All => {
+            scene.generalize();
+            Plan::all(&scene)
+        }
+    };
     stats.plan = plan.summary();
     if let Some(sample) = args.replay {
         return replay(args, &scene, sample);

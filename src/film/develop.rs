@@ -16,11 +16,16 @@ impl Film {
         let mut frame = Frame::new(self.width, self.height);
         frame.set(Layer::Color, self.image(3, |tile, i, c| tile.color[i].mean[c]));
         frame.set(Layer::ColorVariance, self.image(3, |tile, i, c| tile.color[i].variance_of_mean(c, tile.counts[i])));
-        frame.set(Layer::Direct, self.image(3, |tile, i, c| tile.direct[i].mean[c]));
-        frame
-            .set(Layer::DirectVariance, self.image(3, |tile, i, c| tile.direct[i].variance_of_mean(c, tile.counts[i])));
+        frame.set(Layer::Direct, self.image(3, |tile, i, c| tile.direct.get(i).map_or(0.0, |direct| direct.mean[c])));
+        frame.set(
+            Layer::DirectVariance,
+            self.image(3, |tile, i, c| {
+                tile.direct.get(i).map_or(0.0, |direct| direct.variance_of_mean(c, tile.counts[i]))
+            }),
+        );
         frame.set(Layer::Samples, self.image(1, |tile, i, _| tile.counts[i] as f32));
-        frame.set(Layer::Rejected, self.image(1, |tile, i, _| tile.rejected[i] as f32));
+        frame
+            .set(Layer::Rejected, self.image(1, |tile, i, _| tile.rejected.get(i).copied().unwrap_or_default() as f32));
         if self.needs.features {
             self.develop_moments(&mut frame, [Layer::Albedo, Layer::AlbedoVariance], 0, |tile, i| &tile.features[i]);
             self.develop_moments(&mut frame, [Layer::Normal, Layer::NormalVariance], 3, |tile, i| &tile.features[i]);

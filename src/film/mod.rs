@@ -37,6 +37,22 @@ pub struct Needs {
 }
 
 impl Needs {
+    /// Everything.
+    pub const ALL: Self =
+        Self { features: true, edges: true, bins: true, occlusion: true, position: true, ambient: true };
+
+    /// Bytes that a film takes a pixel, as long as the camera sees no emitter; 24 more where it does.
+    pub fn bytes_per_pixel(self) -> usize {
+        let when = |needed: bool, bytes: usize| if needed { bytes } else { 0 };
+        size_of::<u32>()
+            + size_of::<Moments<3>>()
+            + when(self.features, size_of::<Moments<7>>())
+            + when(self.occlusion || self.position, size_of::<Moments<4>>())
+            + when(self.edges, size_of::<Moments<12>>())
+            + when(self.bins, size_of::<[Bin; BINS]>())
+            + when(self.ambient, size_of::<[Bin; BINS]>())
+    }
+
     /// What either wants.
     pub fn union(self, other: Self) -> Self {
         Self {
@@ -80,8 +96,10 @@ pub struct Tile {
     /// Rows.
     pub height: usize,
     counts: Vec<u32>,
+    /// Empty until there is one.
     rejected: Vec<u32>,
     color: Vec<Moments<3>>,
+    /// Empty until the camera sees an emitter.
     direct: Vec<Moments<3>>,
     /// Albedo, normal and depth; empty when not needed.
     features: Vec<Moments<7>>,
@@ -105,9 +123,9 @@ impl Tile {
             width,
             height,
             counts: vec![0; pixels],
-            rejected: vec![0; pixels],
+            rejected: Vec::new(),
             color: vec![Moments::default(); pixels],
-            direct: vec![Moments::default(); pixels],
+            direct: Vec::new(),
             features: vec![Moments::default(); when(needs.features)],
             places: vec![Moments::default(); when(needs.occlusion || needs.position)],
             edges: vec![Moments::default(); when(needs.edges)],
@@ -126,6 +144,7 @@ impl Tile {
         let (sample, outcome) = match sample.check() {
             Ok(()) => (*sample, Ok(())),
             Err(reason) => {
+                self.rejected.resize(self.counts.len(), 0);
                 self.rejected[index] += 1;
                 (Sample::default(), Err(reason))
             }
@@ -135,7 +154,12 @@ impl Tile {
         self.counts[index] += 1;
         let share = 1.0 / self.counts[index] as f32;
         self.color[index].add(sample.color.to_array(), share);
-        self.direct[index].add(sample.direct.to_array(), share);
+        if self.direct.is_empty() && sample.direct != Rgb::ZERO {
+            self.direct.resize(self.counts.len(), Moments::default());
+        }
+        if let Some(direct) = self.direct.get_mut(index) {
+            direct.add(sample.direct.to_array(), share);
+        }
         if let Some(features) = self.features.get_mut(index) {
             features.add(sample.features.to_array(), share);
         }
@@ -155,6 +179,8 @@ impl Tile {
     }
 
     fn merge(&mut self, other: &Self) {
+        self.direct.resize(self.direct.len().max(other.direct.len()), Moments::default());
+        self.rejected.resize(self.rejected.len().max(other.rejected.len()), 0);
         for index in 0..self.counts.len() {
             let (n, m) = (self.counts[index], other.counts[index]);
             if m == 0 {
@@ -162,7 +188,9 @@ impl Tile {
             }
             let share = (f64::from(m) / (f64::from(n) + f64::from(m))) as f32;
             self.color[index].merge(&other.color[index], n, share);
-            self.direct[index].merge(&other.direct[index], n, share);
+            if let Some(direct) = self.direct.get_mut(index) {
+                direct.merge(other.direct.get(index).unwrap_or(&Moments::default()), n, share);
+            }
             if let Some(features) = self.features.get_mut(index) {
                 features.merge(&other.features[index], n, share);
             }
@@ -180,7 +208,9 @@ impl Tile {
                 }
             }
             self.counts[index] = n + m;
-            self.rejected[index] += other.rejected[index];
+            if let Some(rejected) = self.rejected.get_mut(index) {
+                *rejected += other.rejected.get(index).copied().unwrap_or_default();
+            }
         }
     }
 }
@@ -265,13 +295,9 @@ mod tests {
         Sample { color: vec3(value, 2.0, 0.0), direct: Rgb::ONE, features, edges: [Rgb::splat(value); 4], ambient }
     }
 
-    fn all() -> Needs {
-        Needs { features: true, edges: true, bins: true, occlusion: true, position: true, ambient: true }
-    }
-
     #[test]
     fn means_and_variances_are_those_of_the_samples() {
-        let mut film = Film::new(1, 1, all());
+        let mut film = Film::new(1, 1, Needs::ALL);
         let values: Vec<f64> = (0..100).map(|i| f64::from(sample(i).color.x)).collect();
         (0..100).for_each(|i| film.tiles_mut()[0].add(0, &sample(i)).unwrap());
         let mean = values.iter().sum::<f64>() / 100.0;
@@ -293,8 +319,8 @@ mod tests {
 
     #[test]
     fn merging_is_adding_the_samples() {
-        let mut halves = [Film::new(1, 1, all()), Film::new(1, 1, all())];
-        let mut whole = Film::new(1, 1, all());
+        let mut halves = [Film::new(1, 1, Needs::ALL), Film::new(1, 1, Needs::ALL)];
+        let mut whole = Film::new(1, 1, Needs::ALL);
         for i in 0..64 {
             halves[usize::from(i >= 24)].tiles_mut()[0].add(0, &sample(i)).unwrap();
             whole.tiles_mut()[0].add(0, &sample(i)).unwrap();
@@ -310,7 +336,7 @@ mod tests {
 
     #[test]
     fn samples_that_are_not_finite_count_as_zero_and_are_reported() {
-        let mut film = Film::new(2, 1, all());
+        let mut film = Film::new(2, 1, Needs::ALL);
         let bad = Sample { color: vec3(f32::NAN, 1.0, 1.0), ..sample(0) };
         assert!(film.tiles_mut()[0].add(1, &bad).is_err());
         film.tiles_mut()[0].add(1, &Sample { color: Rgb::ONE, ..sample(0) }).unwrap();

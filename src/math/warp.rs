@@ -1,7 +1,8 @@
 //! Maps from the unit square to the domains that are sampled. Each is continuous and has its density beside it.
 
-use std::f32::consts::{FRAC_1_PI, FRAC_PI_2, FRAC_PI_4, PI};
+use std::f32::consts::{FRAC_1_PI, FRAC_PI_4, PI};
 
+use super::lanes::cos_sin_small;
 use super::{Vec2, Vec3, vec2, vec3};
 
 /// Uniform on the unit disk (Shirley and Chiu 1997, concentric map).
@@ -10,12 +11,10 @@ pub fn disk(u: Vec2) -> Vec2 {
     if offset == Vec2::ZERO {
         return Vec2::ZERO;
     }
-    let (radius, angle) = if offset.x.abs() > offset.y.abs() {
-        (offset.x, FRAC_PI_4 * (offset.y / offset.x))
-    } else {
-        (offset.y, FRAC_PI_2 - FRAC_PI_4 * (offset.x / offset.y))
-    };
-    radius * vec2(angle.cos(), angle.sin())
+    let wide = offset.x.abs() > offset.y.abs();
+    let (radius, other) = if wide { (offset.x, offset.y) } else { (offset.y, offset.x) };
+    let (cos, sin) = cos_sin_small(FRAC_PI_4 * (other / radius), |constant| constant);
+    radius * if wide { vec2(cos, sin) } else { vec2(sin, cos) }
 }
 
 /// Cosine-weighted on the upper hemisphere; density cos θ / π.

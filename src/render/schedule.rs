@@ -6,8 +6,8 @@ use std::time::{Duration, Instant};
 
 use rayon::prelude::*;
 
-use super::gradient::shift::Shift;
 use super::SampleId;
+use super::gradient::shift::Shift;
 use super::wave::Wave;
 use crate::film::{Film, Needs, Rejected, Sample, TILE, Tile};
 use crate::scene::Scene;
@@ -160,7 +160,8 @@ fn run_tile(settings: Settings, wave: &mut Wave, tile: &mut Tile, counts: Counts
         let samples = wave.trace(settings.seed, settings.first + index, &pixels);
         for ((&pixel, &(x, y)), sample) in numbers.iter().zip(&pixels).zip(samples) {
             if let Err(reason) = tile.add(pixel, sample) {
-                first_rejected.get_or_insert((SampleId { seed: settings.seed, x, y, index: settings.first + index }, reason));
+                first_rejected
+                    .get_or_insert((SampleId { seed: settings.seed, x, y, index: settings.first + index }, reason));
             }
         }
     }
@@ -169,11 +170,10 @@ fn run_tile(settings: Settings, wave: &mut Wave, tile: &mut Tile, counts: Counts
 
 /// A single sample as it is taken in a render of the whole film, with all that can be recorded of it.
 pub fn sample(scene: &Scene, id: SampleId, shift: Shift) -> Sample {
-    let all = Needs { features: true, edges: true, bins: true, occlusion: true, position: true, ambient: true };
     let (x, y) = (id.x / TILE * TILE, id.y / TILE * TILE);
     let (width, height) = (TILE.min(scene.sensor().width - x), TILE.min(scene.sensor().height - y));
     let pixels: Vec<_> = (0..width * height).map(|pixel| (x + pixel % width, y + pixel / width)).collect();
-    Wave::new(scene, all, shift).trace(id.seed, id.index, &pixels)[(id.y - y) * width + id.x - x]
+    Wave::new(scene, Needs::ALL, shift).trace(id.seed, id.index, &pixels)[(id.y - y) * width + id.x - x]
 }
 
 #[cfg(test)]

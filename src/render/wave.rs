@@ -182,7 +182,8 @@ impl<'a> Wave<'a> {
             if depth == 0 && hide_emitters {
                 scene.pass_emitters(&packet.rays, &mut met, &mut vertices.surfaces);
             }
-            let ends = if scene.has_environment() { !met | vertices.surfaces.glows } else { met & vertices.surfaces.glows };
+            let ends =
+                if scene.has_environment() { !met | vertices.surfaces.glows } else { met & vertices.surfaces.glows };
             for lane in (active & ends).lanes().filter(|_| max_depth > 0) {
                 let id = packet.id.0[lane] as usize;
                 let Some(found) = path::emission(scene, packet, vertices, lane, met.get(lane)) else { continue };
@@ -197,7 +198,8 @@ impl<'a> Wave<'a> {
                     let parent = &mut before[at - 1][place / LANES];
                     parent.emits.set(place % LANES, true);
                     let emission = &mut parent.emission;
-                    scene.keep_light(&mut emission.points, place % LANES, found.point);
+                    let figures = (found.radiance, found.light_pdf);
+                    scene.keep_light(&mut emission.points, place % LANES, found.point, figures);
                     emission.radiance.set(place % LANES, found.radiance);
                     emission.light_pdf.0[place % LANES] = found.light_pdf;
                 }

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::packet::Rays;
+use super::ray_log::RayLog;
 use super::shape::{Bounds, Geometry};
 use super::{Group, Ray, Shape, Surface};
 use crate::error::Result;
@@ -20,6 +21,7 @@ pub struct Accel {
     bounds: Bounds,
     size: f32,
     version: (u32, u32, u32),
+    log: Option<RayLog>,
 }
 
 /// A group of shapes somewhere in the world.
@@ -54,31 +56,46 @@ impl Accel {
         }
         let (_, radius) = bounds.sphere();
         let (first_placement, size) = (shapes.len() as u32, 2.0 * radius);
-        Ok(Self { scene: builder.commit()?, placements, first_placement, bounds, size, version: device.version() })
+        Ok(Self {
+            scene: builder.commit()?,
+            placements,
+            first_placement,
+            bounds,
+            size,
+            version: device.version(),
+            log: None,
+        })
     }
 
     /// The first hit along a ray.
     #[inline]
     pub fn intersect(&self, ray: Ray) -> Option<Hit> {
         let Ray { origin, direction, t_far } = ray;
-        self.scene.intersect(&embree::Ray {
-            origin: origin.to_array(),
-            t_near: 0.0,
-            direction: direction.to_array(),
-            t_far,
-        })
+        let ray = embree::Ray { origin: origin.to_array(), t_near: 0.0, direction: direction.to_array(), t_far };
+        if let Some(log) = &self.log {
+            log.first(ray);
+        }
+        self.scene.intersect(&ray)
     }
 
     /// The first hits along the active rays. `coherent`: they start and run close together.
     #[inline]
     pub fn intersect_packet(&self, rays: &Rays, active: Mask, coherent: bool) -> Hits {
-        self.scene.intersect_packet(&rays.to_embree(active), coherent)
+        let rays = rays.to_embree(active);
+        if let Some(log) = &self.log {
+            log.first_of_packet(rays, coherent);
+        }
+        self.scene.intersect_packet(&rays, coherent)
     }
 
     /// Which of the active rays meet anything.
     #[inline]
     pub fn occluded_packet(&self, rays: &Rays, active: Mask) -> Mask {
-        Mask(self.scene.occluded_packet(&rays.to_embree(active)))
+        let rays = rays.to_embree(active);
+        if let Some(log) = &self.log {
+            log.any_of_packet(rays);
+        }
+        Mask(self.scene.occluded_packet(&rays))
     }
 
     /// The surface of a hit, of one of all shapes.
@@ -93,14 +110,21 @@ impl Accel {
     #[inline]
     pub fn blocked(&self, from: Vec3, to: Vec3) -> bool {
         let (origin, direction) = (from.to_array(), (to - from).to_array());
-        self.scene.occluded(&embree::Ray { origin, t_near: 0.0, direction, t_far: SHADOW_END })
+        let ray = embree::Ray { origin, t_near: 0.0, direction, t_far: SHADOW_END };
+        if let Some(log) = &self.log {
+            log.any(ray);
+        }
+        self.scene.occluded(&ray)
     }
 
-    /// Whether the ray from a point meets anything.
-    #[inline]
-    pub fn blocked_to_infinity(&self, from: Vec3, direction: Vec3) -> bool {
-        let (origin, direction) = (from.to_array(), direction.to_array());
-        self.scene.occluded(&embree::Ray { origin, t_near: 0.0, direction, t_far: f32::INFINITY })
+    /// Keeps every ray from now on.
+    pub fn log_rays(&mut self) {
+        self.log = Some(RayLog::default());
+    }
+
+    /// Traces all rays kept again; returns their number, and that of those which met something.
+    pub fn replay_rays(&self) -> (usize, usize) {
+        self.log.as_ref().map_or((0, 0), |log| log.replay(&self.scene))
     }
 
     /// Diameter of the sphere around everything.

@@ -3,9 +3,11 @@
 
 pub mod accel;
 pub mod bsdf;
+mod census;
 pub mod emitter;
 pub mod load;
 pub mod packet;
+mod ray_log;
 pub mod sensor;
 pub mod shape;
 pub mod surface;
@@ -15,6 +17,7 @@ use std::sync::Arc;
 
 use self::accel::Accel;
 use self::bsdf::Bsdf;
+pub use self::census::Census;
 use self::emitter::{Choice, Emitter, LightPoint};
 use self::packet::{Finish, Lamp};
 use self::sensor::Sensor;
@@ -22,7 +25,7 @@ pub use self::shape::Bounds;
 use self::shape::Geometry;
 pub use self::surface::Surface;
 use crate::error::Result;
-use crate::math::{Mat4, Rgb, Vec2, Vec3};
+use crate::math::{Mat4, Rgb, Vec3};
 
 /// A ray with a unit direction.
 #[derive(Clone, Copy, Debug)]
@@ -105,6 +108,8 @@ pub struct Scene {
     finishes: Vec<Finish>,
     lamps: Vec<Lamp>,
     environment: Option<u32>,
+    /// The environment, if it is an image that is chosen with the same chance everywhere.
+    map: Option<u32>,
     sensor: Sensor,
     integrator: Integrator,
     fingerprint: u64,
@@ -128,6 +133,7 @@ impl Scene {
         let lamps = emitters.iter().enumerate().map(|(i, emitter)| Lamp::new(&**emitter, chance(i))).collect();
         let finishes = shapes.iter().map(Finish::new).collect();
         let environment = surrounding.first().copied();
+        let map = environment.filter(|&index| emitters[index as usize].map().is_some());
         Ok(Self {
             accel,
             shapes,
@@ -136,6 +142,7 @@ impl Scene {
             finishes,
             lamps,
             environment,
+            map,
             sensor,
             integrator,
             fingerprint,
@@ -166,25 +173,6 @@ impl Scene {
         surface::epsilon(p, self.accel.size())
     }
 
-    /// Whether light passes between a surface and a point on an emitter.
-    pub fn visible(&self, from: &Surface, point: &LightPoint) -> bool {
-        match point.position {
-            emitter::Position::Surface { p, n } => {
-                let end = surface::offset(p, n, self.epsilon(p), from.p - p);
-                !self.accel.blocked(from.leave(p - from.p), end)
-            }
-            emitter::Position::Point { p } => !self.accel.blocked(from.leave(p - from.p), p),
-            emitter::Position::Infinity { direction } => {
-                !self.accel.blocked_to_infinity(from.leave(direction), direction)
-            }
-        }
-    }
-
-    /// Whether two surface points see each other.
-    pub fn mutually_visible(&self, a: &Surface, b: &Surface) -> bool {
-        !self.accel.blocked(a.leave(b.p - a.p), b.leave(a.p - b.p))
-    }
-
     /// Whether nothing is met from a point on a surface with this normal along `direction`, for a `share` of the scene's
     /// size.
     pub fn is_open(&self, p: Vec3, n: Vec3, direction: Vec3, share: f32) -> bool {
@@ -197,19 +185,10 @@ impl Scene {
         &*self.shapes[surface.at.shape as usize].bsdf
     }
 
-    /// A point on an emitter, with its density per solid angle at `from` including the choice of emitter.
-    pub fn sample_emitter(&self, from: &Surface, choice: f32, u: Vec2) -> Option<(LightPoint, f32)> {
-        let (index, chance) = self.emitter_choice.as_ref()?.choose(from.p, choice);
-        let emitter = &self.emitters[index];
-        let mut point = emitter.sample(from.p, u)?;
-        point.emitter = index as u32;
-        let pdf = emitter.pdf(from.p, &point) * chance;
-        (pdf > 0.0).then_some((point, pdf))
-    }
-
-    /// Density with which [`Scene::sample_emitter`] finds `point` from `from`.
+    /// Density with which [`Scene::sample_lights`] finds `point` from `from`.
     pub fn emitter_pdf(&self, from: Vec3, point: &LightPoint) -> f32 {
-        let chance = self.emitter_choice.as_ref().map_or(0.0, |choice| choice.probability(from, point.emitter as usize));
+        let chance =
+            self.emitter_choice.as_ref().map_or(0.0, |choice| choice.probability(from, point.emitter as usize));
         if chance > 0.0 { chance * self.emitters[point.emitter as usize].pdf(from, point) } else { 0.0 }
     }
 
@@ -263,6 +242,16 @@ impl Scene {
     /// Hash of the scene's text, to tell scenes apart.
     pub fn fingerprint(&self) -> u64 {
         self.fingerprint
+    }
+
+    /// Keeps every ray that is traced from now on, to know what they take by themselves.
+    pub fn log_rays(&mut self) {
+        self.accel.log_rays();
+    }
+
+    /// Traces all rays kept once more and does nothing else; returns their number, and that of those which met something.
+    pub fn replay_rays(&self) -> (usize, usize) {
+        self.accel.replay_rays()
     }
 
     /// Embree's version, for `info`.

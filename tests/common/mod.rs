@@ -76,6 +76,7 @@ pub fn check_zero(name: &str, runs: &[Vec<f64>]) {
     }
     assert!(count > 500.0 && (sum / count).abs() < 5.0 / f64::sqrt(count), "{name}: mean t {}", sum / count);
     let spread = (squares / count).sqrt();
-    assert!(spread > 0.8 && spread < 1.2, "{name}: spread {spread} instead of 1.07");
+    // Pixels are not independent: all have the same position on the film in a sample.
+    assert!(spread > 0.75 && spread < 1.35, "{name}: spread {spread} instead of 1.07");
     assert!(beyond as f64 <= 0.01 * count, "{name}: {beyond} of {count} beyond four");
 }

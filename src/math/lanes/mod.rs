@@ -12,6 +12,9 @@ pub use self::vector::Lanes3;
 /// Number of floats.
 pub const LANES: usize = 16;
 
+/// Adding 1.5 * 2^23 leaves the nearest integer in the low bits.
+const ROUND: f32 = 12_582_912.0;
+
 /// The floats.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(align(64))]
@@ -125,12 +128,31 @@ impl Lanes {
         Self(out)
     }
 
+    /// Cosines and sines of angles from -π/4 to π/4.
+    #[inline(always)]
+    pub fn cos_sin_small(self) -> (Self, Self) {
+        cos_sin_small(self, Self::splat)
+    }
+
+    /// Cosines and sines of angles in turns, from 0 to 1.
+    #[inline(always)]
+    pub fn cos_sin_turns(self) -> (Self, Self) {
+        let shifted = self * Self::splat(4.0) + Self::splat(ROUND);
+        let quarter = shifted - Self::splat(ROUND);
+        let (cosine, sine) =
+            ((self - quarter * Self::splat(0.25)) * Self::splat(std::f32::consts::TAU)).cos_sin_small();
+        let number = Bits(shifted.0.map(f32::to_bits));
+        let odd = number.map(|bits| bits & 1).equal(1);
+        let negative_sine = number.map(|bits| bits & 2).equal(2);
+        let negative_cosine = number.map(|bits| (bits + 1) & 2).equal(2);
+        let (cosine, sine) = (odd.select(sine, cosine), odd.select(cosine, sine));
+        (negative_cosine.select(-cosine, cosine), negative_sine.select(-sine, sine))
+    }
+
     /// e^x for x <= 0, to a relative 1e-6; zero where x is below -40, so that products of weights do not become
     /// denormal numbers, which take a hundred times as long.
     #[inline(always)]
     pub fn exp_negative(self) -> Self {
-        // Adding 1.5 * 2^23 leaves the nearest integer in the low bits.
-        const ROUND: f32 = 12_582_912.0;
         const LEAST: Lanes = Lanes([-40.0; LANES]);
         let x = self.max(LEAST) * Self::splat(std::f32::consts::LOG2_E);
         let shifted = x + Self::splat(ROUND);
@@ -172,6 +194,21 @@ impl AddAssign for Lanes {
     fn add_assign(&mut self, other: Self) {
         *self = *self + other;
     }
+}
+
+/// Cosine and sine of an angle from -π/4 to π/4, with the same bits for one angle and for sixteen.
+#[inline(always)]
+pub fn cos_sin_small<T>(angle: T, constant: impl Fn(f32) -> T) -> (T, T)
+where
+    T: Copy + Add<Output = T> + Mul<Output = T>,
+{
+    let squared = angle * angle;
+    let series = |[first, rest @ ..]: [f32; 5]| {
+        rest.into_iter().fold(constant(first), |sum, term| sum * squared + constant(term))
+    };
+    let cosine = series([1.0 / 40_320.0, -1.0 / 720.0, 1.0 / 24.0, -0.5, 1.0]);
+    let sine = angle * series([1.0 / 362_880.0, -1.0 / 5_040.0, 1.0 / 120.0, -1.0 / 6.0, 1.0]);
+    (cosine, sine)
 }
 
 /// Which lanes something holds for: all bits of a lane or none.
@@ -283,6 +320,16 @@ mod tests {
         }
         assert_eq!(Lanes::ZERO.exp_negative(), Lanes::splat(1.0));
         assert_eq!(Lanes::splat(-1e30).exp_negative(), Lanes::ZERO);
+    }
+
+    #[test]
+    fn cosines_and_sines_are_those_of_the_angle() {
+        for i in 0..=10_000 {
+            let turns = i as f32 / 10_000.0;
+            let (cosine, sine) = Lanes::splat(turns).cos_sin_turns();
+            let exact = (f64::from(turns) * std::f64::consts::TAU).sin_cos();
+            assert!((f64::from(cosine.0[2]) - exact.1).abs() < 5e-7 && (f64::from(sine.0[2]) - exact.0).abs() < 5e-7);
+        }
     }
 
     #[test]

@@ -49,8 +49,7 @@ impl Gradient {
             let below = counts.get(k + 1).map_or(&[][..], |&packets| &levels[k + 1][..packets]);
             self.next.reset(below.len());
             let walk = Walk { scene, threshold, ambient: self.ambient, base: &levels[0][..packets], below };
-            for packet in 0..count {
-                let vertices = &levels[k][packet];
+            for (packet, vertices) in levels[k][..count].iter().enumerate() {
                 // The other ends of the edges account for what copies of a dark path would carry.
                 let mut lit = vertices.met;
                 vertices.met.lanes().for_each(|lane| lit.set(lane, reach[vertices.id.0[lane] as usize] > k as u32));

@@ -6,7 +6,8 @@ use std::sync::Arc;
 use super::{Emitter, LightPoint, Position};
 use crate::error::Result;
 use crate::math::discrete::Grid;
-use crate::math::{Mat4, Rgb, Vec2, Vec3, luminance, vec2, vec3};
+use crate::math::lanes::{Lanes, Lanes3, Mask};
+use crate::math::{Mat4, Rgb, Vec2, Vec3, Vec4, luminance, vec2, vec3};
 use crate::scene::Bounds;
 use crate::scene::load::props::Object;
 use crate::scene::load::{Loader, Plugin};
@@ -30,7 +31,8 @@ fn make(object: &Object, loader: &mut Loader) -> Result<Box<dyn Emitter>> {
     Ok(Box::new(EnvMap::new(texels, scale, to_world)))
 }
 
-struct EnvMap {
+/// The image with what it takes to draw points of it.
+pub struct EnvMap {
     texels: Arc<Texels>,
     scale: f32,
     to_world: Mat4,
@@ -42,7 +44,39 @@ struct EnvMap {
     area: f32,
 }
 
+/// Sixteen points of an environment, which are the same from everywhere.
+pub struct Sky {
+    /// Unit directions towards them.
+    pub direction: Lanes3,
+    /// Densities per solid angle.
+    pub pdf: Lanes,
+    /// Radiance they send.
+    pub radiance: Lanes3,
+}
+
 impl EnvMap {
+    /// [`Emitter::sample`] with density and radiance, for the active ones.
+    #[inline(always)]
+    pub fn sample_packet(&self, [u, v]: [Lanes; 2], active: Mask) -> Sky {
+        let mut sky = Sky { direction: Lanes3::ZERO, pdf: Lanes::ZERO, radiance: Lanes3::ZERO };
+        let Some(grid) = &self.grid else { return sky };
+        let (mut x, mut y, mut cell_pdf) = (Lanes::ZERO, Lanes::ZERO, Lanes::ZERO);
+        let points = grid.sample_packet(u.0, v.0, active);
+        for lane in active.lanes() {
+            let (uv, pdf) = points[lane];
+            (x.0[lane], y.0[lane], cell_pdf.0[lane]) = (uv.x, uv.y, pdf);
+        }
+        active.lanes().for_each(|lane| sky.radiance.set(lane, self.look_up(vec2(x.0[lane], y.0[lane]))));
+        let (cos_phi, sin_phi) = x.cos_sin_turns();
+        let (cos, sin) = (y * Lanes::splat(0.5)).cos_sin_turns();
+        let local = Lanes3 { x: sin_phi * sin, y: cos, z: -cos_phi * sin };
+        let axis = |column: Vec4| Lanes3::splat(column.truncate());
+        let [right, up, back] = [self.to_world.x_axis, self.to_world.y_axis, self.to_world.z_axis].map(axis);
+        sky.direction = (right * local.x + up * local.y + back * local.z).normalize_or(Lanes3::ZERO);
+        sky.pdf = cell_pdf / (Lanes::splat(2.0 * PI * PI) * sin.max(Lanes::splat(1e-6)));
+        sky
+    }
+
     fn new(texels: Arc<Texels>, scale: f32, to_world: Mat4) -> Self {
         let (width, height) = (texels.width, texels.height);
         let mut weights = vec![0.0; width * height];
@@ -69,12 +103,15 @@ impl EnvMap {
     }
 
     /// Columns have their centres at half numbers and wrap around; the first and last row are the poles.
+    #[inline]
     fn look_up(&self, uv: Vec2) -> Rgb {
         let (width, height) = (self.texels.width, self.texels.height);
         let at = vec2(uv.x * width as f32 - 0.5, uv.y * (height - 1) as f32);
-        let (x, y) = (at.x.floor(), (at.y as usize).min(height - 2));
-        let wrap = |x: f32| (x as i64).rem_euclid(width as i64) as usize;
-        let (left, right) = (wrap(x), wrap(x + 1.0));
+        let y = (at.y as usize).min(height - 2);
+        // Half a column before the first one is the last one.
+        let (right, x) = ((at.x + 1.0) as usize, ((at.x + 1.0) as usize) as f32 - 1.0);
+        let (left, right) =
+            (if right == 0 { width - 1 } else { (right - 1).min(width - 1) }, if right >= width { 0 } else { right });
         let [a, b, c, d] = self.texels.square([left, right], [y, y + 1], false);
         a.lerp(b, at.x - x).lerp(c.lerp(d, at.x - x), at.y - y as f32) * self.scale
     }
@@ -123,6 +160,10 @@ impl Emitter for EnvMap {
 
     fn is_environment(&self) -> bool {
         true
+    }
+
+    fn map(&self) -> Option<&EnvMap> {
+        Some(self)
     }
 
     fn name(&self) -> &'static str {

@@ -11,6 +11,7 @@ mod spot;
 
 pub use self::area::Area;
 pub use self::choice::Choice;
+pub use self::envmap::EnvMap;
 use super::load::Plugin;
 use super::shape::Geometry;
 use super::{Bounds, Surface, texture};
@@ -142,6 +143,11 @@ pub trait Emitter: Send + Sync {
     /// Whether rays that meet nothing end on it.
     fn is_environment(&self) -> bool {
         false
+    }
+
+    /// The image, of one that is an image around the scene.
+    fn map(&self) -> Option<&EnvMap> {
+        None
     }
 
     /// The shape and its radiance, of one that sends the same from everywhere on its outside.

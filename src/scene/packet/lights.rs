@@ -4,8 +4,8 @@ use super::finish::Facet;
 use super::{Rays, Surfaces, surfaces};
 use crate::math::lanes::{Bits, LANES, Lanes, Lanes3, Mask};
 use crate::math::{Rgb, Vec3, vec2};
-use crate::scene::{Scene, accel};
 use crate::scene::emitter::{LightPoint, Position};
+use crate::scene::{Scene, accel};
 
 /// Emitter points, as [`LightPoint`] has them.
 #[derive(Clone, Debug)]
@@ -23,6 +23,10 @@ pub struct Lights {
     emitter: Bits,
     /// Which are on evenly glowing meshes.
     even: Mask,
+    /// Which are the same from everywhere, with their densities and radiance.
+    sky: Mask,
+    sky_pdf: Lanes,
+    sky_radiance: Lanes3,
     /// The others.
     points: [LightPoint; LANES],
 }
@@ -37,6 +41,9 @@ impl Default for Lights {
             delta: Mask::NONE,
             emitter: Bits::ZERO,
             even: Mask::NONE,
+            sky: Mask::NONE,
+            sky_pdf: Lanes::ZERO,
+            sky_radiance: Lanes3::ZERO,
             points: [LightPoint::at_infinity(Vec3::Z, 0); LANES],
         }
     }
@@ -57,10 +64,19 @@ impl Lights {
         self.delta.set(lane, point.delta);
         self.emitter.0[lane] = point.emitter;
         self.even.set(lane, lamps_are_even);
+        self.sky.set(lane, false);
         self.points[lane] = point;
     }
 
-    /// One of them.
+    /// One of them is in the sky.
+    fn set_sky(&mut self, lane: usize, (direction, emitter): (Vec3, u32), pdf: f32, radiance: Rgb) {
+        self.set(lane, LightPoint::at_infinity(direction, emitter), false);
+        self.sky.set(lane, true);
+        self.sky_pdf.0[lane] = pdf;
+        self.sky_radiance.set(lane, radiance);
+    }
+
+    /// One of them; of those in the sky only where they are.
     pub fn get(&self, lane: usize) -> LightPoint {
         if !self.even.get(lane) {
             return self.points[lane];
@@ -107,7 +123,8 @@ impl Scene {
         let Some(table) = self.emitter_choice.as_ref() else { return (found, pdf) };
         let mut facets = [[[0.0f32; LANES]; 3]; 4];
         let (mut second, mut density) = ([0.0f32; LANES], [0.0f32; LANES]);
-        (lights.delta, lights.far, lights.even) = (Mask::NONE, Mask::NONE, Mask::NONE);
+        (lights.delta, lights.far, lights.even, lights.sky) = (Mask::NONE, Mask::NONE, Mask::NONE, Mask::NONE);
+        let mut above = Mask::NONE;
         for lane in active.lanes() {
             let (index, chance) = table.choose(from.p.get(lane), choice.0[lane]);
             let lamp = &self.lamps[index];
@@ -124,6 +141,11 @@ impl Scene {
                 continue;
             }
             let (p, emitter) = (from.p.get(lane), &self.emitters[index]);
+            if self.map == Some(index as u32) {
+                above.set(lane, true);
+                pdf.0[lane] = chance;
+                continue;
+            }
             let Some(mut point) = emitter.sample(p, vec2(u.0[lane], v.0[lane])) else { continue };
             point.emitter = index as u32;
             let one = emitter.pdf(p, &point) * chance;
@@ -133,9 +155,20 @@ impl Scene {
                 pdf.0[lane] = one;
             }
         }
+        if let Some((index, map)) =
+            self.map.filter(|_| above.any()).and_then(|i| Some((i, self.emitters[i as usize].map()?)))
+        {
+            let sky = map.sample_packet([u, v], above);
+            pdf = above.select(pdf * sky.pdf, pdf);
+            for lane in above.lanes() {
+                lights.set_sky(lane, (sky.direction.get(lane), index), pdf.0[lane], sky.radiance.get(lane));
+            }
+            found = found | (above & pdf.greater(Lanes::ZERO));
+        }
         let even = lights.even;
         if even.any() {
-            let [corner, side, other_side, n] = facets.map(|[x, y, z]| Lanes3 { x: Lanes(x), y: Lanes(y), z: Lanes(z) });
+            let [corner, side, other_side, n] =
+                facets.map(|[x, y, z]| Lanes3 { x: Lanes(x), y: Lanes(y), z: Lanes(z) });
             // Uniform over a triangle, as `warp::triangle`.
             let one = Lanes::splat(1.0);
             let root = (one - u).max(Lanes::ZERO).sqrt();
@@ -160,7 +193,8 @@ impl Scene {
             radiance.set(lane, lamp.glow.as_ref().map_or(Rgb::ZERO, |glow| glow.radiance));
         }
         radiance = lights.n.dot(direction).less(Lanes::ZERO).select3(radiance, Lanes3::ZERO);
-        for lane in (active & !lights.even).lanes() {
+        radiance = lights.sky.select3(lights.sky_radiance, radiance);
+        for lane in (active & !(lights.even | lights.sky)).lanes() {
             radiance.set(lane, self.radiance(&lights.points[lane], -direction.get(lane)));
         }
         radiance
@@ -176,7 +210,8 @@ impl Scene {
             density.0[lane] = self.lamps[lights.emitter.0[lane] as usize].density;
         }
         let mut pdf = angle.greater(Lanes::ZERO).select(density / angle, Lanes::ZERO);
-        for lane in (active & !quick).lanes() {
+        pdf = lights.sky.select(lights.sky_pdf, pdf);
+        for lane in (active & !(quick | lights.sky)).lanes() {
             pdf.0[lane] = self.emitter_pdf(from.get(lane), &lights.get(lane));
         }
         pdf
@@ -187,9 +222,17 @@ impl Scene {
         active & !self.accel.occluded_packet(&shadow_rays(self.accel.size(), from, lights), active)
     }
 
-    /// The point of an emitter as packets keep it.
-    pub fn keep_light(&self, lights: &mut Lights, lane: usize, point: LightPoint) {
-        lights.set(lane, point, self.lamps[point.emitter as usize].glow.is_some());
+    /// The point of an emitter as packets keep it, with its radiance and the density with which it would have been chosen
+    /// by whom it was met.
+    pub fn keep_light(&self, lights: &mut Lights, lane: usize, point: LightPoint, (radiance, pdf): (Rgb, f32)) {
+        match point.position {
+            // After a delta lobe its density is not asked for, so that the next paths' must be.
+            Position::Infinity { direction } if self.map == Some(point.emitter) => {
+                let pdf = if pdf > 0.0 { pdf } else { self.emitter_pdf(Vec3::ZERO, &point) };
+                lights.set_sky(lane, (direction, point.emitter), pdf, radiance);
+            }
+            _ => lights.set(lane, point, self.lamps[point.emitter as usize].glow.is_some()),
+        }
     }
 }
 
@@ -197,12 +240,7 @@ impl Scene {
 fn shadow_rays(scene_size: f32, from: &Surfaces, lights: &Lights) -> Rays {
     let towards = lights.far.select3(lights.at, lights.at - from.p);
     let origin = from.leave(towards);
-    let near = surfaces::offset(
-        lights.at,
-        lights.n,
-        surfaces::epsilon(lights.at, scene_size),
-        from.p - lights.at,
-    );
+    let near = surfaces::offset(lights.at, lights.n, surfaces::epsilon(lights.at, scene_size), from.p - lights.at);
     let end = lights.surface.select3(near, lights.at);
     let t_far = lights.far.select(Lanes::splat(f32::INFINITY), Lanes::splat(accel::SHADOW_END));
     Rays { origin, direction: lights.far.select3(lights.at, end - origin), t_far }

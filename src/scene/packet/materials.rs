@@ -158,8 +158,7 @@ impl Materials {
     #[inline(always)]
     pub fn eval(&self, scene: &Scene, surfaces: &Surfaces, (wi, wo): (Lanes3, Lanes3), active: Mask) -> Evals {
         let (in_height, out_height) = (self.height(wi, wi.z), self.height(wi, wo.z));
-        let scatters =
-            active & self.lambert & in_height.greater(Lanes::ZERO) & out_height.greater(Lanes::ZERO);
+        let scatters = active & self.lambert & in_height.greater(Lanes::ZERO) & out_height.greater(Lanes::ZERO);
         let pdf = scatters.select(out_height * Lanes::splat(FRAC_1_PI), Lanes::ZERO);
         let mut evals = Evals { value: self.color * pdf, pdf };
         for lane in (active & !self.lambert).lanes() {
@@ -208,11 +207,7 @@ pub fn disk(u: Lanes, v: Lanes) -> (Lanes, Lanes) {
     let (radius, other) = (wide.select(x, y), wide.select(y, x));
     let nonzero = radius.abs().greater(Lanes::ZERO);
     let angle = nonzero.select(Lanes::splat(FRAC_PI_4) * (other / radius), Lanes::ZERO);
-    // Angles are at most an eighth of a turn, where a few terms are exact.
-    let squared = angle * angle;
-    let series = |terms: [f32; 5]| terms.into_iter().fold(Lanes::ZERO, |sum, term| sum * squared + Lanes::splat(term));
-    let cosine = series([1.0 / 40_320.0, -1.0 / 720.0, 1.0 / 24.0, -0.5, 1.0]);
-    let sine = angle * series([1.0 / 362_880.0, -1.0 / 5_040.0, 1.0 / 120.0, -1.0 / 6.0, 1.0]);
+    let (cosine, sine) = angle.cos_sin_small();
     (radius * wide.select(cosine, sine), radius * wide.select(sine, cosine))
 }
 
@@ -226,7 +221,7 @@ mod tests {
         for i in 0..1000 {
             let u = vec2((i as f32 * 0.618_034).fract(), (i as f32 * 0.754_877).fract());
             let (x, y) = disk(Lanes::splat(u.x), Lanes::splat(u.y));
-            assert!(warp::disk(u).distance(vec2(x.0[3], y.0[3])) < 1e-6);
+            assert_eq!(warp::disk(u), vec2(x.0[3], y.0[3]));
         }
         assert_eq!(disk(Lanes::splat(0.5), Lanes::splat(0.5)), (Lanes::ZERO, Lanes::ZERO));
     }

@@ -252,7 +252,8 @@ fn meshes(
         side[lane] = mesh.side();
         if finishes[number].uv {
             let (u, v) = (hits.u[lane], hits.v[lane]);
-            (surfaces.uv[0].0[lane], surfaces.uv[1].0[lane]) = mesh.uv_at(hits.primitive[lane], [1.0 - u - v, u, v]).into();
+            (surfaces.uv[0].0[lane], surfaces.uv[1].0[lane]) =
+                mesh.uv_at(hits.primitive[lane], [1.0 - u - v, u, v]).into();
         }
     }
     let [a, b, c, na, nb, nc] = corners.map(|[x, y, z]| Lanes3 { x: Lanes(x), y: Lanes(y), z: Lanes(z) });

@@ -112,19 +112,20 @@ impl Texels {
     #[inline]
     pub fn square(&self, [left, right]: [usize; 2], [above, below]: [usize; 2], raw: bool) -> [Rgb; 4] {
         let (above, below) = (above * self.width, below * self.width);
-        let places = [above + left, above + right, below + left, below + right];
+        // Four calls: mapping an array is not inlined.
+        let of = |texel: &dyn Fn(usize) -> Rgb| {
+            [texel(above + left), texel(above + right), texel(below + left), texel(below + right)]
+        };
         match &self.samples {
-            Samples::Float(texels) => places.map(|place| texels[place]),
+            Samples::Float(texels) => of(&|place| texels[place]),
             Samples::Byte(texels) => {
                 let table = decoded(raw);
-                places.map(|place| {
+                of(&|place| {
                     let [r, g, b] = texels[place];
                     vec3(table[r as usize], table[g as usize], table[b as usize])
                 })
             }
-            Samples::Cached { .. } => {
-                places.map(|place| self.texel(place % self.width, place / self.width, raw))
-            }
+            Samples::Cached { .. } => of(&|place| self.texel(place % self.width, place / self.width, raw)),
         }
     }
 }

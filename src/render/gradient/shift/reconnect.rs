@@ -3,8 +3,8 @@
 
 use super::super::offsets::Packet;
 use crate::math::lanes::{Lanes, Lanes3, Mask};
-use crate::scene::packet::{Lights, Surfaces};
 use crate::scene::Scene;
+use crate::scene::packet::{Lights, Surfaces};
 
 /// A Jacobian beyond this, or below its inverse, is a geometry that floats cannot hold; the shift then fails in
 /// both directions.
