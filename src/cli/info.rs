@@ -131,7 +131,9 @@ fn describe(scene: &Scene, method: &str) -> Result<()> {
     println!("fingerprint  {:016x}", scene.fingerprint());
     println!("with method {method}:");
     let needs = reconstruct::parse(method)?.needs();
-    for item in Plan::new(scene, needs, Needs::default()).items {
+    let plan = Plan::new(scene, needs, Needs::default());
+    println!("  film         {} bytes a pixel, 24 more where the camera sees an emitter", plan.needs.bytes_per_pixel());
+    for item in plan.items {
         let verb = if item.computed { "computed" } else { "left out" };
         println!("  {:<12} {verb}: {}", item.what, item.reason);
     }

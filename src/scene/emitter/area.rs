@@ -3,7 +3,7 @@
 use std::f32::consts::PI;
 use std::sync::Arc;
 
-use super::{Emitter, LightPoint, Position};
+use super::{Emitter, Extent, LightPoint, Position};
 use crate::math::{Rgb, Vec2, Vec3};
 use crate::scene::shape::Geometry;
 use crate::scene::texture::Texture;
@@ -42,6 +42,11 @@ impl Emitter for Area {
 
     fn power(&self) -> f32 {
         PI * self.geometry.area() * self.radiance.mean().max(0.0)
+    }
+
+    fn extent(&self) -> Option<Extent> {
+        let (axis, spread) = self.geometry.normals();
+        Some(Extent { bounds: self.geometry.bounds(), axis, spread, reach: 0.5 * PI })
     }
 
     fn even(&self) -> Option<(&Arc<Geometry>, Rgb)> {

@@ -1,12 +1,20 @@
 //! Which emitter lights a point.
 
 use super::Emitter;
+use super::tree::Tree;
 use crate::math::Vec3;
 use crate::math::alias::Alias;
 
+/// With more emitters than this, those near a point are told from those far away.
+const MANY: usize = 100;
+
 /// The chances of a scene's emitters.
 pub struct Choice {
+    /// Every emitter; of many only those without a place, then the tree of all others.
     table: Alias,
+    /// Numbers of the table's emitters, where it has not all.
+    listed: Vec<u32>,
+    tree: Option<Tree>,
 }
 
 impl Choice {
@@ -17,25 +25,47 @@ impl Choice {
         let total: f32 = powers.iter().sum();
         let lit = powers.iter().filter(|&&power| power > 0.0).count() as f32;
         let share = |power: f32| if power > 0.0 { 0.5 / lit + 0.5 * (power / total) } else { 0.0 };
-        let weights: Vec<_> = powers.into_iter().map(share).collect();
-        Some(Self { table: Alias::new(&weights)? })
+        let weights: Vec<_> = powers.iter().map(|&power| share(power)).collect();
+        if emitters.len() <= MANY {
+            return Some(Self { table: Alias::new(&weights)?, listed: Vec::new(), tree: None });
+        }
+        let placed = |i: usize| Some((i, emitters[i].extent()?, powers[i])).filter(|&(_, _, power)| power > 0.0);
+        let in_tree: Vec<_> = (0..emitters.len()).filter_map(placed).collect();
+        let of_tree = in_tree.iter().map(|&(i, ..)| weights[i]).sum();
+        let listed: Vec<u32> =
+            (0..emitters.len()).filter(|&i| emitters[i].extent().is_none()).map(|i| i as u32).collect();
+        let weights: Vec<_> = listed.iter().map(|&i| weights[i as usize]).chain([of_tree]).collect();
+        Some(Self { table: Alias::new(&weights)?, listed, tree: Tree::new(in_tree, emitters.len()) })
     }
 
     /// The emitter that `u` in [0, 1) stands for at a point, and its chance.
     #[inline]
-    pub fn choose(&self, _from: Vec3, u: f32) -> (usize, f32) {
-        let (index, _) = self.table.sample(u);
-        (index, self.table.probability(index))
+    pub fn choose(&self, from: Vec3, u: f32) -> (usize, f32) {
+        let (index, rest) = self.table.sample(u);
+        let chance = self.table.probability(index);
+        let Some(tree) = &self.tree else { return (index, chance) };
+        if let Some(&emitter) = self.listed.get(index) {
+            return (emitter as usize, chance);
+        }
+        let (emitter, of_tree) = tree.choose(from, rest);
+        (emitter, chance * of_tree)
     }
 
     /// Chance of an emitter at a point.
     #[inline]
-    pub fn probability(&self, _from: Vec3, emitter: usize) -> f32 {
-        self.table.probability(emitter)
+    pub fn probability(&self, from: Vec3, emitter: usize) -> f32 {
+        let Some(tree) = &self.tree else { return self.table.probability(emitter) };
+        match tree.probability(from, emitter) {
+            Some(of_tree) => self.table.probability(self.listed.len()) * of_tree,
+            None => {
+                let at = self.listed.iter().position(|&listed| listed as usize == emitter);
+                at.map_or(0.0, |at| self.table.probability(at))
+            }
+        }
     }
 
     /// The chance of an emitter, where it is the same everywhere.
     pub fn constant(&self, emitter: usize) -> Option<f32> {
-        Some(self.table.probability(emitter))
+        self.tree.is_none().then(|| self.table.probability(emitter))
     }
 }

@@ -8,10 +8,12 @@ mod directional;
 mod envmap;
 mod point;
 mod spot;
+mod tree;
 
 pub use self::area::Area;
 pub use self::choice::Choice;
 pub use self::envmap::EnvMap;
+pub use self::tree::Extent;
 use super::load::Plugin;
 use super::shape::Geometry;
 use super::{Bounds, Surface, texture};
@@ -130,6 +132,11 @@ pub trait Emitter: Send + Sync {
 
     /// Emitted power, for choosing among emitters; a rough figure will do, but 0 only for no light at all.
     fn power(&self) -> f32;
+
+    /// Where it is and shines; `None` when it is everywhere or nowhere.
+    fn extent(&self) -> Option<Extent> {
+        None
+    }
 
     /// Told once what the emitter lights, for those that surround it.
     fn enclose(&mut self, _scene: Bounds) {}

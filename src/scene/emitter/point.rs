@@ -2,9 +2,10 @@
 
 use std::f32::consts::PI;
 
-use super::{Emitter, LightPoint, Position};
+use super::{Emitter, Extent, LightPoint, Position};
 use crate::error::Result;
 use crate::math::{Rgb, Vec2, Vec3};
+use crate::scene::Bounds;
 use crate::scene::load::props::Object;
 use crate::scene::load::{Loader, Plugin};
 
@@ -42,6 +43,10 @@ impl Emitter for Point {
 
     fn power(&self) -> f32 {
         4.0 * PI * self.intensity.max_element().max(0.0)
+    }
+
+    fn extent(&self) -> Option<Extent> {
+        Some(Extent { bounds: Bounds::of([self.position]), axis: Vec3::Z, spread: PI, reach: 0.5 * PI })
     }
 
     fn name(&self) -> &'static str {

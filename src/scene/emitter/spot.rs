@@ -3,9 +3,10 @@
 use std::f32::consts::TAU;
 use std::sync::Arc;
 
-use super::{Emitter, LightPoint, Position};
+use super::{Emitter, Extent, LightPoint, Position};
 use crate::error::Result;
 use crate::math::{Mat4, Rgb, Vec2, Vec3, vec2};
+use crate::scene::Bounds;
 use crate::scene::load::props::Object;
 use crate::scene::load::{Loader, Plugin};
 use crate::scene::texture::{self, Texture};
@@ -71,6 +72,11 @@ impl Emitter for Spot {
         // 1 - cos α as 2 sin² α/2: the narrowest cone has some power.
         let cone = 2.0 * TAU * (0.25 * (self.cutoff + self.beam)).sin().powi(2);
         cone * self.intensity.max_element().max(0.0) * self.slide.mean().max(0.0)
+    }
+
+    fn extent(&self) -> Option<Extent> {
+        let axis = self.to_local.inverse().transform_vector3(Vec3::Z).normalize_or(Vec3::Z);
+        Some(Extent { bounds: Bounds::of([self.position]), axis, spread: 0.0, reach: self.cutoff })
     }
 
     fn name(&self) -> &'static str {

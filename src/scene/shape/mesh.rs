@@ -194,6 +194,13 @@ impl Mesh {
         self.area
     }
 
+    /// The middle of all geometric normals and the largest angle to one of them.
+    pub fn normals(&self) -> (Vec3, f32) {
+        let normals = || self.corners.iter().map(|corners| self.normals_at(corners, [1.0 / 3.0; 3]).0);
+        let middle = normals().sum::<Vec3>().normalize_or(Vec3::Z);
+        (middle, normals().map(|n| middle.dot(n).clamp(-1.0, 1.0).acos()).fold(0.0, f32::max))
+    }
+
     /// Box around all triangles.
     pub fn bounds(&self) -> Bounds {
         self.bounds

@@ -137,6 +137,14 @@ impl Geometry {
         }
     }
 
+    /// The middle of all geometric normals and the largest angle to one of them; π where they are not known.
+    pub fn normals(&self) -> (Vec3, f32) {
+        match self {
+            Self::Mesh(mesh) => mesh.normals(),
+            Self::Sphere(_) | Self::Disk(_) | Self::Cylinder(_) => (Vec3::Z, PI),
+        }
+    }
+
     /// A point to light `from` with; the emitter's number is left to the caller.
     pub fn sample(&self, from: Vec3, u: Vec2) -> Option<LightPoint> {
         match self {
