@@ -2,8 +2,9 @@
 
 use super::features::{self, FeatureWalk};
 use super::gradient::Gradient;
-use super::paths::Paths;
-use super::vertices::Vertices;
+use super::path::Shaded;
+use super::paths::{Packet, Paths};
+use super::vertices::{Emission, Vertices};
 use super::{Sampler, path};
 use crate::film::{Needs, Sample};
 use crate::math::lanes::{Bits, LANES, Lanes, Lanes3, Mask};
@@ -172,8 +173,7 @@ impl<'a> Wave<'a> {
         if traced.levels.len() == at {
             traced.levels.push(Vec::new());
         }
-        let (before, level) = traced.levels.split_at_mut(at);
-        let level = &mut level[0];
+        let mut level = std::mem::take(&mut traced.levels[at]);
         level.resize_with(level.len().max(paths.len().div_ceil(LANES)), Vertices::default);
         onward.clear();
         for (k, (packet, active)) in paths.packets().enumerate() {
@@ -182,41 +182,12 @@ impl<'a> Wave<'a> {
             if depth == 0 && hide_emitters {
                 scene.pass_emitters(&packet.rays, &mut met, &mut vertices.surfaces);
             }
-            let ends =
-                if scene.has_environment() { !met | vertices.surfaces.glows } else { met & vertices.surfaces.glows };
-            for lane in (active & ends).lanes().filter(|_| max_depth > 0) {
-                let id = packet.id.0[lane] as usize;
-                let Some(found) = path::emission(scene, packet, vertices, lane, met.get(lane)) else { continue };
-                if depth == 0 {
-                    traced.samples[id].direct = if hide_emitters { Rgb::ZERO } else { found.radiance };
-                    continue;
-                }
-                traced.samples[id].color += found.color;
-                traced.reach[id] = depth;
-                if record {
-                    let place = packet.parent.0[lane] as usize;
-                    let parent = &mut before[at - 1][place / LANES];
-                    parent.emits.set(place % LANES, true);
-                    let emission = &mut parent.emission;
-                    let figures = (found.radiance, found.light_pdf);
-                    scene.keep_light(&mut emission.points, place % LANES, found.point, figures);
-                    emission.radiance.set(place % LANES, found.radiance);
-                    emission.light_pdf.0[place % LANES] = found.light_pdf;
-                }
+            if max_depth > 0 {
+                traced.end_on_emitters(scene, depth, packet, (vertices, active, met), record.then_some(at));
             }
             vertices.materials.look(scene, &vertices.surfaces, met);
             if describes {
-                for lane in active.lanes() {
-                    let id = packet.id.0[lane] as usize;
-                    let (walk, features) = (&mut traced.walks[id], &mut traced.samples[id].features);
-                    if depth == 0 {
-                        *features = features::far(scene, packet.rays.get(lane));
-                    }
-                    if met.get(lane) && !walk.is_done() {
-                        let surface = (&vertices.surfaces, &vertices.materials, lane);
-                        walk.visit(features, scene, surface, packet.rays.origin.get(lane));
-                    }
-                }
+                traced.describe(scene, depth, packet, (vertices, active, met));
             }
             vertices.emits = Mask::NONE;
             if depth + 1 >= max_depth {
@@ -226,23 +197,93 @@ impl<'a> Wave<'a> {
             (vertices.met, vertices.id, vertices.throughput) = (met, packet.id, packet.throughput);
             let first_place = (k * LANES) as u32;
             let shaded = path::shade((scene, &sampler), depth, packet, vertices, first_place, onward);
-            for lane in vertices.lit.lanes() {
-                let id = packet.id.0[lane] as usize;
-                traced.samples[id].color += shaded.color.get(lane);
-                traced.reach[id] = depth + 1;
+            traced.keep(depth, vertices, &shaded);
+            if describes || needs.ambient {
+                traced.pass_on(vertices, needs.ambient);
             }
-            for lane in shaded.broken.lanes() {
-                traced.samples[packet.id.0[lane] as usize].color = Rgb::NAN;
+        }
+        traced.levels[at] = level;
+    }
+}
+
+impl Traced {
+    /// Adds the emitters that the active ones of some paths have run into, by surfaces or, where none is met, by what is
+    /// around the scene. `recorded` is the level of the vertices, where those before are kept.
+    fn end_on_emitters(
+        &mut self,
+        scene: &Scene,
+        depth: u32,
+        packet: &Packet,
+        (vertices, active, met): (&Vertices, Mask, Mask),
+        recorded: Option<usize>,
+    ) {
+        let glows = met & vertices.surfaces.glows;
+        let ends = if scene.has_environment() { active & (!met | glows) } else { active & glows };
+        for lane in ends.lanes() {
+            let id = packet.id.0[lane] as usize;
+            let Some(found) = path::emission(scene, packet, vertices, lane, met.get(lane)) else { continue };
+            if depth == 0 {
+                let hidden = scene.integrator().hide_emitters;
+                self.samples[id].direct = if hidden { Rgb::ZERO } else { found.radiance };
+                continue;
             }
-            for lane in vertices.scattered.lanes().filter(|_| describes || needs.ambient) {
-                let id = packet.id.0[lane] as usize;
-                if needs.ambient {
-                    let beyond = vertices.throughput.get(lane) * vertices.scatters.weight.get(lane);
-                    traced.samples[id].ambient.color += beyond / vertices.survival.0[lane];
-                }
-                if !traced.walks[id].is_done() {
-                    traced.walks[id].pass(&vertices.scatters.get(lane));
-                }
+            self.samples[id].color += found.color;
+            self.reach[id] = depth;
+            if let Some(level) = recorded {
+                let (place, lane) = (packet.parent.0[lane] as usize / LANES, packet.parent.0[lane] as usize % LANES);
+                let parent = &mut self.levels[level - 1][place];
+                parent.emits.set(lane, true);
+                let Emission { points, radiance, light_pdf } = &mut parent.emission;
+                scene.keep_light(points, lane, found.point, (found.radiance, found.light_pdf));
+                radiance.set(lane, found.radiance);
+                light_pdf.0[lane] = found.light_pdf;
+            }
+        }
+    }
+
+    /// Tells the features of what the active ones of some paths show.
+    fn describe(
+        &mut self,
+        scene: &Scene,
+        depth: u32,
+        packet: &Packet,
+        (vertices, active, met): (&Vertices, Mask, Mask),
+    ) {
+        for lane in active.lanes() {
+            let id = packet.id.0[lane] as usize;
+            let (walk, features) = (&mut self.walks[id], &mut self.samples[id].features);
+            if depth == 0 {
+                *features = features::far(scene, packet.rays.get(lane));
+            }
+            if met.get(lane) && !walk.is_done() {
+                let surface = (&vertices.surfaces, &vertices.materials, lane);
+                walk.visit(features, scene, surface, packet.rays.origin.get(lane));
+            }
+        }
+    }
+
+    /// Adds the light that has been chosen at some vertices.
+    fn keep(&mut self, depth: u32, vertices: &Vertices, shaded: &Shaded) {
+        for lane in vertices.lit.lanes() {
+            let id = vertices.id.0[lane] as usize;
+            self.samples[id].color += shaded.color.get(lane);
+            self.reach[id] = depth + 1;
+        }
+        for lane in shaded.broken.lanes() {
+            self.samples[vertices.id.0[lane] as usize].color = Rgb::NAN;
+        }
+    }
+
+    /// Paths go on from some vertices: by what features see through, and to where an ambient light would be.
+    fn pass_on(&mut self, vertices: &Vertices, ambient: bool) {
+        for lane in vertices.scattered.lanes() {
+            let id = vertices.id.0[lane] as usize;
+            if ambient {
+                let beyond = vertices.throughput.get(lane) * vertices.scatters.weight.get(lane);
+                self.samples[id].ambient.color += beyond / vertices.survival.0[lane];
+            }
+            if !self.walks[id].is_done() {
+                self.walks[id].pass(&vertices.scatters.get(lane));
             }
         }
     }
