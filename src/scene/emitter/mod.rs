@@ -82,20 +82,6 @@ impl LightPoint {
         Self { position, at: texture::Point::default(), emitter: 0, delta: true }
     }
 
-    /// Unit direction from `from` towards the point.
-    #[inline]
-    pub fn direction(&self, from: Vec3) -> Vec3 {
-        match self.position {
-            Position::Surface { p, .. } | Position::Point { p } => (p - from).normalize_or_zero(),
-            Position::Infinity { direction } => direction,
-        }
-    }
-
-    /// Density with which scattering of density `pdf` runs into the point: never, when it is the only one.
-    pub fn scatter_pdf(&self, pdf: f32) -> f32 {
-        if self.delta { 0.0 } else { pdf }
-    }
-
     /// A density per area as one per solid angle at `from`; 0 from behind.
     pub fn area_to_solid_angle(&self, from: Vec3, density: f32) -> f32 {
         let factor = self.solid_angle(from);

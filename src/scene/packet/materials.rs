@@ -65,11 +65,6 @@ impl Evals {
         self.value.set(lane, value);
         self.pdf.0[lane] = pdf;
     }
-
-    /// One of them.
-    pub fn get(&self, lane: usize) -> Eval {
-        Eval { value: self.value.get(lane), pdf: self.pdf.0[lane] }
-    }
 }
 
 impl Default for Scatters {
@@ -124,7 +119,7 @@ impl Materials {
         }
     }
 
-    /// One of them, with the number of its lane, in another packet's.
+    /// Replaces one of them by one of others.
     #[inline(always)]
     pub fn copy(&mut self, to: usize, from: &Self, lane: usize) {
         self.lambert.0[to] = from.lambert.0[lane];

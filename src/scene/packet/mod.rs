@@ -1,7 +1,7 @@
 //! Sixteen rays at a time: what they meet, what lights it and how it scatters.
 //!
 //! What nearly every scene is made of, meshes of diffuse materials under evenly glowing meshes, is worked out for all rays
-//! together; everything else is asked of its own trait, ray by ray. A ray's result does not depend on the others'.
+//! together; everything else is asked of its own trait, ray by ray. Both have the same bits.
 
 mod finish;
 mod lights;
