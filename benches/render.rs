@@ -126,7 +126,7 @@ fn load_at(path: &Path, size: Option<(usize, usize)>) -> Scene {
 
 fn seconds(scene: &Scene, spp: u32, needs: Needs) -> f64 {
     let settings = Settings { budget: Budget::Spp(spp), seed: 1, first: 0, needs, shift: Shift::default() };
-    let control = Control { stop: &AtomicBool::new(false), progress: &|_| () };
+    let control = Control { stop: &AtomicBool::new(false), progress: &|_| (), keeper: None };
     let elapsed: Duration = render(scene, settings, &control).elapsed;
     elapsed.as_secs_f64()
 }

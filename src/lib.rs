@@ -12,6 +12,7 @@
 //! an image from a frame, and the **plan** says what need not be computed for it.
 
 pub mod error;
+pub mod files;
 pub mod math;
 
 pub mod ffi;
@@ -27,6 +28,7 @@ pub mod render;
 pub mod reconstruct;
 
 pub mod adaptive;
+pub mod checkpoint;
 
 pub mod metrics;
 pub mod reference;

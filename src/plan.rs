@@ -21,16 +21,18 @@ pub struct Plan {
     pub needs: Needs,
     /// All decisions.
     pub items: Vec<Item>,
+    dark: bool,
 }
 
 impl Plan {
     /// Decides for a method's needs and what is to be saved besides.
     pub fn new(scene: &Scene, method: Needs, saved: Needs) -> Self {
         let wanted = method.union(saved);
-        let needs = Needs { edges: wanted.edges && edges_differ(scene).is_ok(), ..wanted };
+        let dark = edges_differ(scene).is_err();
+        let needs = Needs { edges: wanted.edges && !dark, ..wanted };
         let mut items = of_film(scene, method, saved, needs);
         items.extend(of_scene(scene, needs));
-        Self { needs, items }
+        Self { needs, items, dark }
     }
 
     /// Leaves nothing out, for comparison: the scene is to be [generalized](Scene::generalize) as well.
@@ -40,6 +42,11 @@ impl Plan {
             (item.computed, item.reason) = (true, "everything is asked for".to_owned());
         }
         Self { needs: Needs::ALL, ..plan }
+    }
+
+    /// Whether there is no scattered light, so that differences are not rendered since they are known to be zero.
+    pub fn is_dark(&self) -> bool {
+        self.dark
     }
 
     /// One line: `+gradients -features -bins`.

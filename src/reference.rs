@@ -78,7 +78,7 @@ impl Reference {
         let (mut halves, mut seconds) = (Vec::new(), 0.0);
         for (k, seed) in [self.seed, rng::combine(self.seed, 1)].into_iter().enumerate() {
             let progress = |share: f32| (control.progress)(0.5 * (k as f32 + share));
-            let control = Control { stop: control.stop, progress: &progress };
+            let control = Control { stop: control.stop, progress: &progress, keeper: None };
             let (budget, first, needs) = (Budget::Spp(spp), self.spp / 2, Needs::default());
             let outcome = render(scene, Settings { budget, seed, first, needs, shift: Shift::default() }, &control);
             if outcome.stopped {
@@ -140,9 +140,7 @@ impl Reference {
         let channels = CHANNELS.map(String::from).to_vec();
         let (width, height) = (self.image.width, self.image.height);
         let pixels = Pixels { width, height, channels, data, eight_bit: false, attributes };
-        let part = path.with_extension("part.exr");
-        write(&part, &pixels, if half && self.fits_half() { Kind::Half } else { Kind::Float }, Some("zip"))?;
-        std::fs::rename(&part, path).map_err(|error| Error::io(path, error))
+        write(path, &pixels, if half && self.fits_half() { Kind::Half } else { Kind::Float }, Some("zip"))
     }
 
     /// Whether a file was written by [`Reference::save`].
@@ -226,5 +224,5 @@ pub fn image_and_variance(film: &Film) -> Result<(Image, Image)> {
 
 /// A control that neither stops nor reports.
 pub fn silently<T>(work: impl FnOnce(&Control) -> T) -> T {
-    work(&Control { stop: &AtomicBool::new(false), progress: &|_| {} })
+    work(&Control { stop: &AtomicBool::new(false), progress: &|_| {}, keeper: None })
 }

@@ -32,7 +32,7 @@ fn run(scene: &Scene, method: &str, allocator: &dyn Allocator, limits: Limits) -
         reconstruction: None,
         lit: true,
     };
-    adaptive::run(scene, &settings, &Control { stop: &AtomicBool::new(false), progress: &|_| {} }, &QUIET)
+    adaptive::run(scene, &settings, &Control { stop: &AtomicBool::new(false), progress: &|_| {}, keeper: None }, &QUIET)
 }
 
 fn spp(spp: u32) -> Limits {
@@ -126,7 +126,8 @@ fn a_stop_leaves_an_image_of_what_there_is() {
     };
     let stop = AtomicBool::new(false);
     let progress = |_| stop.store(true, Ordering::Relaxed);
-    let outcome = adaptive::run(&scene, &settings, &Control { stop: &stop, progress: &progress }, &QUIET).unwrap();
+    let outcome =
+        adaptive::run(&scene, &settings, &Control { stop: &stop, progress: &progress, keeper: None }, &QUIET).unwrap();
     assert!(outcome.render.stopped && outcome.render.film.samples() < 40 * 30 * 64);
     assert!(outcome.solution.image.data.iter().all(|value| value.is_finite()));
 }
@@ -144,12 +145,11 @@ fn unequal(scene: &Scene, seed: u64, needs: Needs) -> Frame {
     let mut outcome = render::Outcome::new(scene, needs);
     let width = outcome.film.width;
     let counts: Vec<u32> = (0..width * outcome.film.height).map(|i| skewed(i % width, i / width)).collect();
-    let control = Control { stop: &AtomicBool::new(false), progress: &|_| {} };
+    let control = Control { stop: &AtomicBool::new(false), progress: &|_| {}, keeper: None };
     // In two parts, which do not end at a whole number of bins.
     let first: Vec<u32> = counts.iter().map(|&n| n / 3).collect();
-    let rest: Vec<u32> = counts.iter().zip(&first).map(|(&n, &m)| n - m).collect();
-    render::add(scene, samples(needs, seed), &control, &mut outcome, &first);
-    render::add(scene, samples(needs, seed), &control, &mut outcome, &rest);
+    render::raise(scene, samples(needs, seed), &control, &mut outcome, &first);
+    render::raise(scene, samples(needs, seed), &control, &mut outcome, &counts);
     assert_eq!(outcome.film.counts(), counts);
     outcome.film.develop()
 }

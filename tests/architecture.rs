@@ -6,9 +6,10 @@ use std::path::{Path, PathBuf};
 /// Module, and the modules that it may use besides itself and `error`.
 const ALLOWED: &[(&str, &[&str])] = &[
     ("error", &[]),
+    ("files", &[]),
     ("math", &[]),
     ("ffi", &[]),
-    ("image", &["math", "ffi"]),
+    ("image", &["math", "ffi", "files"]),
     ("solve", &["math", "image"]),
     ("scene", &["math", "image", "ffi"]),
     ("film", &["math", "image"]),
@@ -16,6 +17,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("render", &["scene", "film", "plan", "image", "math"]),
     ("reconstruct", &["film", "image", "solve", "math"]),
     ("adaptive", &["scene", "render", "film", "reconstruct", "image", "math"]),
+    ("checkpoint", &["scene", "render", "film", "adaptive", "image", "math", "files"]),
     ("metrics", &["image", "math"]),
     ("reference", &["scene", "film", "render", "image", "math"]),
     ("validate", &["scene", "reference", "image"]),

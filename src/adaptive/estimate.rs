@@ -4,6 +4,7 @@
 use crate::film::{Frame, Layer};
 use crate::image::planes::Planes;
 use crate::reconstruct::Solution;
+use serde::{Deserialize, Serialize};
 
 /// Luminance squared below which relMSE counts errors as they are.
 const EPSILON: f64 = 0.01;
@@ -15,7 +16,7 @@ const PRIOR: f64 = 2.0;
 const TAILS: f64 = 0.1;
 
 /// What has been seen in all passes so far. Sums over pixels, errors relative to the image's brightness.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub struct Estimate {
     /// Weighted squares of expected errors.
     expected: f64,
@@ -29,7 +30,7 @@ pub struct Estimate {
 }
 
 /// Found over expected.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 struct Ratio {
     found: f64,
     expected: f64,

@@ -6,16 +6,19 @@
 
 mod allocate;
 mod estimate;
+mod journal;
 mod predicted_error;
 mod uniform;
 mod variance;
 
+use std::sync::{Mutex, MutexGuard};
 use std::time::{Duration, Instant};
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use self::allocate::allocate;
-use self::estimate::Estimate;
+use self::journal::Stage;
+pub use self::journal::{Journal, Notes, Seen};
 use crate::error::{Error, Result};
 use crate::film::Frame;
 use crate::reconstruct::{self, Context, Reconstruction, Solution};
@@ -86,7 +89,7 @@ pub struct Settings<'a> {
 }
 
 /// A pass: samples and what they led to.
-#[derive(Clone, Copy, Debug, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Pass {
     /// Mean samples per pixel after it.
     pub spp: f64,
@@ -134,8 +137,29 @@ const SLOPE: f64 = 0.85;
 /// Share of a pass after which its speed is looked at again.
 const LOOK: f64 = 0.85;
 
+/// Where to begin, and where to write down how far it has come.
+pub struct Begun<'a> {
+    /// What has been rendered.
+    pub render: render::Outcome,
+    /// What has been decided. A [`render::Keeper`] finds it in step with the film.
+    pub journal: &'a Mutex<Journal>,
+}
+
 /// Renders and reconstructs within limits.
 pub fn run(scene: &Scene, settings: &Settings, control: &Control, context: &Context) -> Result<Outcome> {
+    let render = render::Outcome::new(scene, settings.render.needs);
+    resume(scene, settings, control, context, Begun { render, journal: &Mutex::default() })
+}
+
+/// Goes on with a run of the same settings, wherever it ended. Unless time is among the limits, all decisions and samples
+/// are the same as in a run without interruption.
+pub fn resume(
+    scene: &Scene,
+    settings: &Settings,
+    control: &Control,
+    context: &Context,
+    begun: Begun,
+) -> Result<Outcome> {
     let goes_by_error = settings.allocator.needs_error() || settings.limits.error.is_some();
     if goes_by_error && !settings.method.estimates_error() {
         return Err(Error::Usage(
@@ -144,9 +168,10 @@ pub fn run(scene: &Scene, settings: &Settings, control: &Control, context: &Cont
                 .into(),
         ));
     }
-    let render = render::Outcome::new(scene, settings.render.needs);
-    let (start, passes, times) = (Instant::now(), Vec::new(), Times::default());
-    Run { scene, settings, control, context, goes_by_error, start, render, passes, left: PASSES, times }.go()
+    let Begun { render, journal } = begun;
+    let now = Instant::now();
+    let (start, times) = (now.checked_sub(render.elapsed).unwrap_or(now), Times::default());
+    Run { scene, settings, control, context, goes_by_error, start, render, journal, times }.go()
 }
 
 /// Seconds that were spent besides rendering.
@@ -166,9 +191,7 @@ struct Run<'a> {
     goes_by_error: bool,
     start: Instant,
     render: render::Outcome,
-    passes: Vec<Pass>,
-    /// Passes that are left, unless there is an error to reach.
-    left: u32,
+    journal: &'a Mutex<Journal>,
     times: Times,
 }
 
@@ -181,29 +204,46 @@ struct State {
 
 impl Run<'_> {
     fn go(mut self) -> Result<Outcome> {
-        self.begin();
-        let mut estimate = Estimate::default();
-        let frame = self.develop();
-        let mut state = self.look(frame, &estimate)?;
+        // A pass that was interrupted is brought to its end first.
+        let stage = self.journal().stage();
+        let mut state = match stage {
+            Stage::Fresh => {
+                self.begin();
+                self.look()?
+            }
+            Stage::Dealing => {
+                self.give(None);
+                self.look()?
+            }
+            Stage::Between => {
+                let frame = self.develop();
+                self.know(frame)?
+            }
+        };
         while let Some(samples) = self.next(state.error) {
             let need = self.settings.allocator.need(&state.frame, state.solution.as_ref())?;
+            self.journal().before = Seen::new(state.frame, state.solution);
             self.deal(&need, samples);
-            let frame = self.develop();
-            if let Some(solution) = &state.solution {
-                estimate.learn(&state.frame, solution, &frame);
-            }
-            state = self.look(frame, &estimate)?;
+            state = self.look()?;
+        }
+        if let Some(keeper) = self.control.keeper {
+            keeper.keep(&self.render);
         }
         let State { frame, solution, .. } = state;
         let solution = solution.map_or_else(|| self.solve(&frame), Ok)?;
+        let passes = self.journal().notes.passes.clone();
         Ok(Outcome {
             frame,
             solution,
             develop: self.times.develop,
             reconstruct: self.times.reconstruct,
             render: self.render,
-            passes: self.passes,
+            passes,
         })
+    }
+
+    fn journal(&self) -> MutexGuard<'_, Journal> {
+        self.journal.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
     }
 
     fn pixels(&self) -> f64 {
@@ -236,8 +276,8 @@ impl Run<'_> {
     fn begin(&mut self) {
         let Limits { time, error, .. } = self.settings.limits;
         // One sample tells the speed.
-        self.add(1);
-        let all = self.affordable() / self.pixels() + 1.0;
+        self.fill(1);
+        let all = (self.affordable() + self.samples()) / self.pixels();
         let first = match error {
             Some(_) => f64::from(2 * FIRST),
             None => f64::from(FIRST).max(FIRST_SHARE * all),
@@ -245,11 +285,12 @@ impl Run<'_> {
         let too_slow = |time: Duration| self.goes_by_error && self.finish() > 2.0 * OVERHEAD * time.as_secs_f64();
         let decides = error.is_some() || self.settings.allocator.id() != uniform::Uniform.id();
         if decides && all > 1.5 * first && !time.is_some_and(too_slow) {
-            return self.add(first as u32 - 1);
+            return self.fill(first as u32);
         }
-        self.left = 0;
-        self.add((LOOK * (all - 1.0)) as u32);
-        self.add((self.affordable() / self.pixels() + if time.is_some() { 0.5 } else { 0.0 }) as u32);
+        self.journal().notes.left = 0;
+        self.fill((1.0 + LOOK * (all - 1.0)) as u32);
+        let rounding = if time.is_some() { 0.5 } else { 0.0 };
+        self.fill(((self.affordable() + self.samples()) / self.pixels() + rounding) as u32);
     }
 
     /// Samples of the next pass, or none if this was the last.
@@ -258,55 +299,67 @@ impl Run<'_> {
         if self.render.stopped || most < 1.0 {
             return None;
         }
+        let Notes { passes, left, .. } = self.journal().notes.clone();
         if let Some(target) = self.settings.limits.error {
             let growth = (error? / target).powf(1.0 / SLOPE) - 1.0;
             // New samples are to confirm what the first image claims.
-            let least = if self.passes.len() == 1 { CONFIRM } else { GROWTH.0 };
-            let reached = self.passes.len() > 1 && growth <= 0.0;
+            let least = if passes.len() == 1 { CONFIRM } else { GROWTH.0 };
+            let reached = passes.len() > 1 && growth <= 0.0;
             return (!reached).then(|| (self.samples() * growth.clamp(least, GROWTH.1)).min(most));
         }
         let cost = if self.goes_by_error { self.finish() } else { 0.0 };
         let time = self.settings.limits.time.map(|time| time.as_secs_f64());
         // As many as reconstructions between them leave time for.
         let looks = time.map_or(f64::INFINITY, |time| OVERHEAD * time / cost.max(1e-9));
-        let passes = f64::from(self.left).min(1.0 + looks.floor());
-        if self.left == 0 {
+        let passes = f64::from(left).min(1.0 + looks.floor());
+        if left == 0 {
             return None;
         }
-        self.left = passes as u32 - 1;
+        self.journal().notes.left = passes as u32 - 1;
         let lost = time.map_or(0.0, |_| (passes - 1.0) * cost * self.speed());
         Some((most - lost).max(1.0) / passes)
     }
 
     /// Gives samples to the pixels that need them. Within a time limit the last pass looks at its speed on the way.
     fn deal(&mut self, need: &[f32], samples: f64) {
-        let in_parts = self.settings.limits.time.is_some() && self.left == 0;
+        let in_parts = self.settings.limits.time.is_some() && self.journal().notes.left == 0;
         let first = if in_parts { LOOK * samples } else { samples };
-        self.give(need, first as u64);
+        self.give(Some((need, first as u64)));
         if in_parts && !self.render.stopped {
-            self.give(need, self.affordable().min(samples) as u64);
+            self.give(Some((need, self.affordable().min(samples) as u64)));
         }
     }
 
-    fn give(&mut self, need: &[f32], samples: u64) {
-        self.render(&allocate(need, &self.render.film.counts(), samples));
+    /// Gives new samples, or those that were written down before.
+    fn give(&mut self, new: Option<(&[f32], u64)>) {
+        if let Some((need, samples)) = new {
+            let mut goals = self.render.film.counts();
+            let added = allocate(need, &goals, samples);
+            goals.iter_mut().zip(added).for_each(|(goal, more)| *goal += more);
+            self.journal().goals = goals;
+        }
+        let goals = self.journal().goals.clone();
+        self.render(&goals);
     }
 
-    fn add(&mut self, spp: u32) {
+    fn fill(&mut self, spp: u32) {
         self.render(&vec![spp; self.pixels() as usize]);
     }
 
-    fn render(&mut self, counts: &[u32]) {
+    /// Renders until every pixel has as many samples as its goal.
+    fn render(&mut self, goals: &[u32]) {
         let Limits { spp, time, .. } = self.settings.limits;
-        let (done, all) = (self.samples(), counts.iter().map(|&n| f64::from(n)).sum::<f64>());
+        let done = self.samples();
+        let missing = goals.iter().zip(self.render.film.counts()).map(|(&goal, count)| goal.saturating_sub(count));
+        let all: f64 = missing.map(f64::from).sum();
         let (start, pixels) = (self.start, self.pixels());
         let progress = |share: f32| {
             let by_spp = spp.map_or(0.0, |spp| (done + f64::from(share) * all) / (f64::from(spp) * pixels));
             let by_time = time.map_or(0.0, |time| start.elapsed().as_secs_f64() / time.as_secs_f64());
             (self.control.progress)(by_spp.max(by_time).min(1.0) as f32);
         };
-        let control = Control { stop: self.control.stop, progress: &progress };
-        render::add(self.scene, self.settings.render, &control, &mut self.render, counts);
+        let control = Control { progress: &progress, ..*self.control };
+        render::raise(self.scene, self.settings.render, &control, &mut self.render, goals);
     }
 
     fn develop(&mut self) -> Frame {
@@ -328,12 +381,25 @@ impl Run<'_> {
         Ok(solution)
     }
 
-    /// What is known now; without a reconstruction if nothing goes by it.
-    fn look(&mut self, frame: Frame, estimate: &Estimate) -> Result<State> {
-        let solution = if self.goes_by_error && self.left > 0 { Some(self.solve(&frame)?) } else { None };
-        let error = solution.as_ref().map(|solution| estimate.rel_mse(&frame, solution));
+    /// Ends a pass: learns from its samples how right the last image was, and writes down what is known now.
+    fn look(&mut self) -> Result<State> {
+        let frame = self.develop();
+        if self.render.stopped {
+            // The pass is not over: going on, it is brought to its end.
+            return Ok(State { frame, solution: None, error: None });
+        }
+        self.journal().learn(&frame);
+        let state = self.know(frame)?;
         let (spp, seconds) = (self.samples() / self.pixels(), self.start.elapsed().as_secs_f64());
-        self.passes.push(Pass { spp, seconds, error });
+        self.journal().notes.passes.push(Pass { spp, seconds, error: state.error });
+        Ok(state)
+    }
+
+    /// What is known now; without a reconstruction if nothing goes by it.
+    fn know(&mut self, frame: Frame) -> Result<State> {
+        let notes = self.journal().notes.clone();
+        let solution = if self.goes_by_error && notes.left > 0 { Some(self.solve(&frame)?) } else { None };
+        let error = solution.as_ref().map(|solution| notes.estimate.rel_mse(&frame, solution));
         Ok(State { frame, solution, error })
     }
 }

@@ -115,7 +115,7 @@ impl<'a> Runner<'a> {
         stop: &AtomicBool,
         seconds: &mut Seconds,
     ) -> (render::Outcome, Frame) {
-        let control = Control { stop, progress: &|_| {} };
+        let control = Control { stop, progress: &|_| {}, keeper: None };
         let outcome = render(&self.case.scene, self.settings(budget, seed), &control);
         seconds.render = outcome.elapsed.as_secs_f64();
         let start = Instant::now();
@@ -180,7 +180,7 @@ impl<'a> Runner<'a> {
             reconstruction: Some(Duration::from_secs_f64(terms.finish)),
             lit: self.lit,
         };
-        let control = Control { stop: terms.stop, progress: &|_| {} };
+        let control = Control { stop: terms.stop, progress: &|_| {}, keeper: None };
         let outcome = adaptive::run(&self.case.scene, &settings, &control, &QUIET)?;
         let adaptive::Outcome { render, solution, develop, reconstruct, .. } = outcome;
         (seconds.render, seconds.develop, seconds.reconstruct) = (render.elapsed.as_secs_f64(), develop, reconstruct);

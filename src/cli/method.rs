@@ -1,10 +1,9 @@
 //! What `render` and `reconstruct` have in common: a method, its image, and what it left on the way.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use anyhow::{Context as _, Result};
-use fluxion::error::Error;
+use anyhow::{Context as _, Result, bail};
 use fluxion::film::{Frame, Layer};
 use fluxion::image::io;
 use fluxion::reconstruct::{self, Context, Reconstruction, Solution};
@@ -77,15 +76,32 @@ impl Args {
 }
 
 /// Writes the image to every output, with estimated error and sample counts where the format has layers, and takes the
-/// time.
-pub fn write(outputs: &[PathBuf], solution: &Solution, frame: &Frame, stats: &mut Stats) -> Result<(), Error> {
+/// time. If it cannot be written anywhere, it goes to the folder for temporary files.
+pub fn write(outputs: &[PathBuf], solution: &Solution, frame: &Frame, stats: &mut Stats) -> Result<()> {
     let start = Instant::now();
     let error = solution.error.as_ref().map(|error| ("error", error));
     let samples = frame.get(Layer::Samples).map(|samples| ("samples", samples));
     let layers: Vec<_> = error.into_iter().chain(samples).collect();
+    let put = |path: &Path| io::write_color(path, &solution.image, &layers, &frame.attributes);
+    let (mut written, mut failed) = (Vec::new(), Vec::new());
     for path in outputs {
-        io::write_color(path, &solution.image, &layers, &frame.attributes)?;
+        match put(path) {
+            Ok(()) => written.push(path.display().to_string()),
+            Err(error) => failed.push(error.to_string()),
+        }
     }
     stats.seconds.write += start.elapsed().as_secs_f64();
-    Ok(())
+    if failed.is_empty() {
+        return Ok(());
+    }
+    // What took hours is not to be lost for want of room in one place.
+    let rescue = std::env::temp_dir().join(format!("fluxion-{}.exr", std::process::id()));
+    if written.is_empty() && put(&rescue).is_ok() {
+        written.push(rescue.display().to_string());
+    }
+    let kept = match written.as_slice() {
+        [] => "nothing could be written".to_owned(),
+        written => format!("the image is in {}", written.join(", ")),
+    };
+    bail!("{}; {kept}", failed.join("; "))
 }

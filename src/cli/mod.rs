@@ -1,8 +1,10 @@
 //! The command line: one file per command.
 
 mod bench;
+mod checkpoint;
 mod compare;
 mod info;
+mod merge;
 mod method;
 mod outputs;
 mod progress;
@@ -40,6 +42,8 @@ enum Command {
     Bench(bench::Args),
     /// Render the reference image of a scene, in waves that can be gone on with
     Reference(reference::Args),
+    /// Add up the samples of checkpoints, from other machines or seeds
+    Merge(merge::Args),
     /// Show what a scene holds and needs, or what Fluxion knows
     Info(info::Args),
     /// Render bundled scenes and check them against their references
@@ -54,6 +58,7 @@ pub fn run(args: Args) -> Result<ExitCode> {
         Command::Compare(args) => compare::run(&args),
         Command::Bench(args) => bench::run(&args),
         Command::Reference(args) => reference::run(&args),
+        Command::Merge(args) => merge::run(&args),
         Command::Info(args) => info::run(&args),
         Command::Validate(args) => validate::run(&args),
     }

@@ -1,17 +1,11 @@
 //! Output files, claimed before the work so that nothing is rendered in vain.
 
-use std::fs::OpenOptions;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Result, bail};
 use fluxion::error::Error;
+use fluxion::files;
 use fluxion::image::io;
-
-/// Fails on a path that cannot be written. A file that is there already keeps its content until it is replaced.
-fn claim(path: &Path) -> Result<()> {
-    let file = OpenOptions::new().create(true).append(true).open(path);
-    file.map(drop).with_context(|| format!("cannot write {}", path.display()))
-}
 
 /// Removes the empty files that were claimed and never written, when the work has failed.
 pub struct Claims(Vec<PathBuf>);
@@ -32,8 +26,8 @@ impl Claims {
                 bail!(Error::Usage(what));
             }
             taken.push(path_identity);
-            claim(path)?;
             claims.0.push(path.clone());
+            files::claim(path)?;
         }
         Ok(claims)
     }

@@ -5,6 +5,7 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use anyhow::Result;
+use fluxion::checkpoint;
 use fluxion::film::{Layer, exr};
 
 use super::method;
@@ -14,7 +15,7 @@ use super::stats::Stats;
 /// Options of `reconstruct`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// EXR file written by `fluxion render --layers`
+    /// EXR file written by `fluxion render --layers`, or a checkpoint
     layers: PathBuf,
     /// Image to write, by its extension: exr, hdr, png or jpg; may be given several times
     #[arg(short, long, required = true, value_name = "FILE")]
@@ -38,7 +39,11 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let method = args.method.make()?;
     let mut stats = Stats { method: args.method.method.clone(), ..Stats::default() };
     let start = Instant::now();
-    let mut frame = exr::load(&args.layers)?;
+    let mut frame = if checkpoint::is_one(&args.layers) {
+        checkpoint::load(&args.layers)?.develop(method.needs())
+    } else {
+        exr::load(&args.layers)?
+    };
     let _claims = Claims::new(&args.output, &[&args.json], &[&args.layers])?;
     stats.seconds.load = start.elapsed().as_secs_f64();
     stats.spp = frame.attribute("fluxion:spp").and_then(|text| text.parse().ok()).unwrap_or(0);

@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use fluxion::adaptive::Pass;
+use fluxion::files;
 use fluxion::render::Outcome;
 use serde::Serialize;
 
@@ -57,6 +58,6 @@ impl Stats {
     pub fn save(&mut self, path: &Path) -> Result<()> {
         self.peak_bytes = fluxion::bench::peak_bytes();
         let text = serde_json::to_string_pretty(self)?;
-        std::fs::write(path, text + "\n").with_context(|| format!("cannot write {}", path.display()))
+        Ok(files::write(path, text + "\n")?)
     }
 }

@@ -6,6 +6,9 @@ pub mod exr;
 mod frame;
 pub mod layer;
 mod sample;
+mod stored;
+
+use serde::{Deserialize, Serialize};
 
 pub use self::frame::Frame;
 pub use self::layer::Layer;
@@ -20,7 +23,7 @@ pub const BINS: usize = 8;
 pub const TILE: usize = 16;
 
 /// What a method wants recorded besides colour.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Needs {
     /// Albedo, normal and depth with their variances.
     pub features: bool,
@@ -51,6 +54,11 @@ impl Needs {
             + when(self.edges, size_of::<Moments<12>>())
             + when(self.bins, size_of::<[Bin; BINS]>())
             + when(self.ambient, size_of::<[Bin; BINS]>())
+    }
+
+    /// Whether everything that `other` wants is there.
+    pub fn cover(self, other: Self) -> bool {
+        self.union(other) == self
     }
 
     /// What either wants.
@@ -186,7 +194,7 @@ impl Tile {
             if m == 0 {
                 continue;
             }
-            let share = (f64::from(m) / (f64::from(n) + f64::from(m))) as f32;
+            let share = f64::from(m) / (f64::from(n) + f64::from(m));
             self.color[index].merge(&other.color[index], n, share);
             if let Some(direct) = self.direct.get_mut(index) {
                 direct.merge(other.direct.get(index).unwrap_or(&Moments::default()), n, share);
@@ -202,9 +210,11 @@ impl Tile {
             }
             for (bins, theirs) in [(&mut self.bins, &other.bins), (&mut self.ambient, &other.ambient)] {
                 let Some(bins) = bins.get_mut(index) else { continue };
-                for (k, (mine, theirs)) in bins.iter_mut().zip(&theirs[index]).enumerate() {
-                    let (a, b) = (sample::bin_count(n, k), sample::bin_count(m, k));
-                    mine.add(theirs, if b > 0 { b as f32 / (a + b) as f32 } else { 0.0 });
+                // Their samples come after ours: the first of them is in the bin that is next.
+                for (k, theirs) in theirs[index].iter().enumerate() {
+                    let to = (n as usize + k) % BINS;
+                    let (a, b) = (f64::from(sample::bin_count(n, to)), f64::from(sample::bin_count(m, k)));
+                    bins[to].add(theirs, if b > 0.0 { (b / (a + b)) as f32 } else { 0.0 });
                 }
             }
             self.counts[index] = n + m;
@@ -260,6 +270,11 @@ impl Film {
         counts
     }
 
+    /// Samples of the pixel that has the fewest.
+    pub fn fewest_samples(&self) -> u32 {
+        self.tiles.iter().flat_map(|tile| &tile.counts).copied().min().unwrap_or(0)
+    }
+
     /// Samples of the pixel that has the most.
     pub fn most_samples(&self) -> u32 {
         self.tiles.iter().flat_map(|tile| &tile.counts).copied().max().unwrap_or(0)
@@ -270,7 +285,7 @@ impl Film {
         self.tiles.iter().flat_map(|tile| &tile.rejected).map(|&count| u64::from(count)).sum()
     }
 
-    /// Adds the samples of a film of the same size and needs, taken with another seed.
+    /// Adds the samples of a film of the same size and needs as if they had been taken after those here.
     pub fn merge(&mut self, other: &Self) {
         assert_eq!((self.width, self.height, self.needs), (other.width, other.height, other.needs), "films differ");
         self.tiles.iter_mut().zip(&other.tiles).for_each(|(mine, theirs)| mine.merge(theirs));

@@ -56,6 +56,15 @@ pub struct Rejected(
     pub &'static str,
 );
 
+impl Rejected {
+    const PARTS: [&'static str; 5] = ["color", "direct", "features", "ambient light", "edges"];
+
+    /// The reason of a name.
+    pub fn named(name: &str) -> Self {
+        Self(Self::PARTS.into_iter().find(|part| *part == name).unwrap_or("something in them"))
+    }
+}
+
 impl Sample {
     pub(super) fn check(&self) -> Result<(), Rejected> {
         let finite = |ok: bool, what| if ok { Ok(()) } else { Err(Rejected(what)) };
@@ -105,11 +114,13 @@ impl<const N: usize> Moments<N> {
     }
 
     /// Adds another group that makes up `share` of both together; this one has `n` samples (Chan et al. 1979).
-    pub fn merge(&mut self, other: &Self, n: u32, share: f32) {
+    pub fn merge(&mut self, other: &Self, n: u32, share: f64) {
         for i in 0..N {
-            let apart = other.mean[i] - self.mean[i];
-            self.mean[i] += apart * share;
-            self.deviation[i] += other.deviation[i] + apart * apart * (n as f32 * share);
+            let (mean, deviation) = (f64::from(self.mean[i]), f64::from(self.deviation[i]));
+            let apart = f64::from(other.mean[i]) - mean;
+            self.mean[i] = (mean + apart * share) as f32;
+            let between = apart * apart * f64::from(n) * share;
+            self.deviation[i] = (deviation + f64::from(other.deviation[i]) + between) as f32;
         }
     }
 

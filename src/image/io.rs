@@ -4,7 +4,9 @@ use std::path::Path;
 
 use super::Image;
 use crate::error::{Error, Result};
-pub use crate::ffi::oiio::{CachedTexture, ImageFile, Kind, Pixels, TextureSystem, read, write};
+use crate::ffi::oiio;
+pub use crate::ffi::oiio::{CachedTexture, ImageFile, Kind, Pixels, TextureSystem, read};
+use crate::files;
 use crate::math::srgb_encode;
 
 /// Formats that hold linear radiance as floats.
@@ -24,6 +26,11 @@ pub fn check_writable(path: &Path) -> Result<()> {
     }
     let formats = [LINEAR, ENCODED].concat().join(", ");
     Err(Error::io(path, format!("the extension `{extension}` is not one of {formats}")))
+}
+
+/// Writes an image in the format of the path's extension, whole or not at all.
+pub fn write(path: &Path, pixels: &Pixels, kind: Kind, compression: Option<&str>) -> Result<()> {
+    files::replace(path, |part| oiio::write(part, pixels, kind, compression))
 }
 
 /// Writes a linear RGB image: as it is to exr and hdr; clamped and sRGB-encoded to png and jpg. An exr file gets

@@ -9,11 +9,13 @@ mod schedule;
 mod vertices;
 mod wave;
 
+use serde::{Deserialize, Serialize};
+
 pub use self::sampler::Sampler;
-pub use self::schedule::{Budget, Control, Outcome, Settings, add, render, sample};
+pub use self::schedule::{Budget, Control, Keeper, Outcome, Settings, raise, render, resume, sample};
 
 /// One sample of one pixel, the same whenever and wherever it is asked for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SampleId {
     /// The render's seed.
     pub seed: u64,

@@ -37,21 +37,33 @@ pub struct Settings {
     pub shift: Shift,
 }
 
+/// Keeps what has been rendered while there is more to come.
+pub trait Keeper: Sync {
+    /// Whether it is time again; asked between tiles.
+    fn due(&self) -> bool;
+
+    /// Called while nothing is being traced, and when the render has ended.
+    fn keep(&self, outcome: &Outcome);
+}
+
 /// Threads between the caller and a render that is under way.
+#[derive(Clone, Copy)]
 pub struct Control<'a> {
     /// Set to end the render after the tiles that are being worked on.
     pub stop: &'a AtomicBool,
     /// Told the finished share, in [0, 1].
     pub progress: &'a (dyn Fn(f32) + Sync),
+    /// Who keeps the film from time to time.
+    pub keeper: Option<&'a dyn Keeper>,
 }
 
 /// A rendered film and how it went.
 pub struct Outcome {
     /// The film.
     pub film: Film,
-    /// Samples of a pixel, where all have the same; else the most.
+    /// Samples of the pixel that has the fewest.
     pub spp: u32,
-    /// Wall-clock time.
+    /// Wall-clock time, that of earlier sessions included.
     pub elapsed: Duration,
     /// Whether `stop` ended it early.
     pub stopped: bool,
@@ -72,33 +84,34 @@ const ROUND: u32 = 8;
 
 /// Renders until the budget is used up.
 pub fn render(scene: &Scene, settings: Settings, control: &Control) -> Outcome {
-    let start = Instant::now();
-    let mut outcome = Outcome::new(scene, settings.needs);
-    while let Some(round) = next_round(settings.budget, outcome.spp, start.elapsed()) {
-        let done = outcome.spp;
+    resume(scene, settings, control, Outcome::new(scene, settings.needs))
+}
+
+/// Goes on with a render of the same settings, wherever it ended, until the budget of both is used up. Samples are the
+/// same bits as in a render without interruption.
+pub fn resume(scene: &Scene, settings: Settings, control: &Control, mut outcome: Outcome) -> Outcome {
+    outcome.stopped = false;
+    while let (false, Some(round)) = (outcome.stopped, next_round(settings.budget, outcome.spp, outcome.elapsed)) {
+        let (done, elapsed, start) = (outcome.spp, outcome.elapsed, Instant::now());
         let progress = |share: f32| match settings.budget {
             Budget::Spp(spp) => (control.progress)((done as f32 + round as f32 * share) / spp as f32),
-            Budget::Time(limit) => (control.progress)(start.elapsed().as_secs_f32() / limit.as_secs_f32()),
+            Budget::Time(limit) => {
+                (control.progress)((elapsed + start.elapsed()).as_secs_f32() / limit.as_secs_f32());
+            }
         };
-        run_round(scene, settings, &Control { stop: control.stop, progress: &progress }, &mut outcome, &|_, _| round);
-        outcome.spp += round;
-        outcome.stopped = control.stop.load(Ordering::Relaxed);
-        if outcome.stopped {
-            break;
-        }
+        let control = Control { progress: &progress, ..*control };
+        run_round(scene, settings, &control, &mut outcome, &|_, _| done + round);
     }
-    outcome.elapsed = start.elapsed();
+    if let Some(keeper) = control.keeper {
+        keeper.keep(&outcome);
+    }
     outcome
 }
 
-/// Renders on: adds as many samples to each pixel as `counts` says, row by row. The budget is not looked at.
-pub fn add(scene: &Scene, settings: Settings, control: &Control, outcome: &mut Outcome, counts: &[u32]) {
-    let start = Instant::now();
+/// Goes on until each pixel has as many samples as `goals` says, row by row. The budget is not looked at.
+pub fn raise(scene: &Scene, settings: Settings, control: &Control, outcome: &mut Outcome, goals: &[u32]) {
     let width = outcome.film.width;
-    run_round(scene, settings, control, outcome, &|x, y| counts[y * width + x]);
-    outcome.spp = outcome.film.most_samples();
-    outcome.stopped = control.stop.load(Ordering::Relaxed);
-    outcome.elapsed += start.elapsed();
+    run_round(scene, settings, control, outcome, &|x, y| goals[y * width + x]);
 }
 
 /// Samples per pixel of the next round, none when the budget is used up. A time budget is met by the rounds' own
@@ -116,41 +129,63 @@ fn next_round(budget: Budget, done: u32, elapsed: Duration) -> Option<u32> {
     }
 }
 
-/// Number of samples that a round adds to the pixel in a column and row.
-type Counts<'a> = &'a (dyn Fn(usize, usize) -> u32 + Sync);
+/// Number of samples that the pixel in a column and row is to have after a round.
+type Goals<'a> = &'a (dyn Fn(usize, usize) -> u32 + Sync);
 
-/// Adds a round; `control.progress` is told the share of it.
-fn run_round(scene: &Scene, settings: Settings, control: &Control, outcome: &mut Outcome, counts: Counts) {
+/// Renders a round, with pauses whenever the film is to be kept.
+fn run_round(scene: &Scene, settings: Settings, control: &Control, outcome: &mut Outcome, goals: Goals) {
+    let (before, start) = (outcome.elapsed, Instant::now());
+    let mut paused = true;
+    while paused {
+        paused = run_tiles(scene, settings, control, outcome, goals);
+        outcome.elapsed = before + start.elapsed();
+        outcome.spp = outcome.film.fewest_samples();
+        outcome.stopped = control.stop.load(Ordering::Relaxed);
+        if let (true, Some(keeper)) = (paused, control.keeper) {
+            keeper.keep(outcome);
+        }
+    }
+}
+
+/// Brings tiles to their goals until the film is to be kept, which returns true. `control.progress` is told the share
+/// of them.
+fn run_tiles(scene: &Scene, settings: Settings, control: &Control, outcome: &mut Outcome, goals: Goals) -> bool {
     let first_rejected = Mutex::new(outcome.first_rejected);
+    let due = AtomicBool::new(false);
     let tiles = outcome.film.tiles_mut();
     let (total, done) = (tiles.len(), Mutex::new(0));
     let wave_of = || Wave::new(scene, settings.needs, settings.shift);
     tiles.par_iter_mut().for_each_init(wave_of, |wave, tile| {
-        if control.stop.load(Ordering::Relaxed) {
+        if control.stop.load(Ordering::Relaxed) || due.load(Ordering::Relaxed) {
             return;
         }
-        if let Some(rejected) = run_tile(settings, wave, tile, counts) {
+        if let Some(rejected) = run_tile(settings, wave, tile, goals) {
             let mut first = first_rejected.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
             first.get_or_insert(rejected);
         }
         let mut done = done.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
         *done += 1;
         (control.progress)(*done as f32 / total as f32);
+        if control.keeper.is_some_and(|keeper| keeper.due()) {
+            due.store(true, Ordering::Relaxed);
+        }
     });
     outcome.first_rejected = first_rejected.into_inner().unwrap_or_else(|poisoned| poisoned.into_inner());
+    due.into_inner()
 }
 
-fn run_tile(settings: Settings, wave: &mut Wave, tile: &mut Tile, counts: Counts) -> Option<(SampleId, Rejected)> {
+fn run_tile(settings: Settings, wave: &mut Wave, tile: &mut Tile, goals: Goals) -> Option<(SampleId, Rejected)> {
     let mut first_rejected = None;
     let at = |pixel: usize, tile: &Tile| (tile.x + pixel % tile.width, tile.y + pixel / tile.width);
     // Samples of one number are traced together, whatever number a pixel begins with.
     let spans: Vec<_> = (0..tile.width * tile.height)
         .map(|pixel| {
             let (x, y) = at(pixel, tile);
-            tile.count(pixel)..tile.count(pixel) + counts(x, y)
+            tile.count(pixel)..goals(x, y)
         })
         .collect();
-    let (start, end) = (spans.iter().map(|span| span.start).min(), spans.iter().map(|span| span.end).max());
+    let due = || spans.iter().filter(|span| !span.is_empty());
+    let (start, end) = (due().map(|span| span.start).min(), due().map(|span| span.end).max());
     let (mut numbers, mut pixels) = (Vec::new(), Vec::new());
     for index in start.unwrap_or(0)..end.unwrap_or(0) {
         numbers.clear();

@@ -26,6 +26,7 @@ use self::shape::Geometry;
 pub use self::surface::Surface;
 use crate::error::Result;
 use crate::math::{Mat4, Rgb, Vec3};
+use std::path::PathBuf;
 
 /// A ray with a unit direction.
 #[derive(Clone, Copy, Debug)]
@@ -94,6 +95,8 @@ pub struct Parts {
     pub integrator: Integrator,
     /// Hash of the scene's text.
     pub fingerprint: u64,
+    /// Meshes and images that it was read from.
+    pub files: Vec<PathBuf>,
 }
 
 /// Everything a path can meet.
@@ -113,12 +116,13 @@ pub struct Scene {
     sensor: Sensor,
     integrator: Integrator,
     fingerprint: u64,
+    files: Vec<PathBuf>,
 }
 
 impl Scene {
     /// Builds the acceleration structure and the emitter choice.
     pub fn build(parts: Parts, threads: usize) -> Result<Self> {
-        let Parts { mut shapes, groups, mut emitters, sensor, integrator, fingerprint } = parts;
+        let Parts { mut shapes, groups, mut emitters, sensor, integrator, fingerprint, files } = parts;
         let accel = Accel::build(&shapes, &groups, threads)?;
         shapes.extend(groups.into_iter().flat_map(|group| group.shapes));
         let numbered = (0u32..).zip(&emitters);
@@ -146,6 +150,7 @@ impl Scene {
             sensor,
             integrator,
             fingerprint,
+            files,
         })
     }
 
@@ -242,6 +247,11 @@ impl Scene {
     /// Hash of the scene's text, to tell scenes apart.
     pub fn fingerprint(&self) -> u64 {
         self.fingerprint
+    }
+
+    /// Meshes and images that it was read from.
+    pub fn files(&self) -> &[PathBuf] {
+        &self.files
     }
 
     /// Keeps every ray that is traced from now on, to know what they take by themselves.

@@ -55,7 +55,7 @@ pub fn film(scene: &Scene, spp: u32, seed: u64, needs: Needs) -> Film {
 /// The same with a shift of our choice.
 pub fn shifted_film(scene: &Scene, spp: u32, seed: u64, needs: Needs, shift: Shift) -> Film {
     let settings = Settings { budget: Budget::Spp(spp), seed, first: 0, needs, shift };
-    render(scene, settings, &Control { stop: &AtomicBool::new(false), progress: &|_| {} }).film
+    render(scene, settings, &Control { stop: &AtomicBool::new(false), progress: &|_| {}, keeper: None }).film
 }
 
 /// Over all values, means over sixteen runs of what must be zero in the mean look like it: centred, spread as Student's t

@@ -10,7 +10,8 @@ mod spectrum;
 mod transform;
 mod xml;
 
-use std::collections::HashMap;
+use std::cell::RefCell;
+use std::collections::{BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 use std::sync::Arc;
@@ -71,6 +72,8 @@ pub struct Loader {
     bitmaps: HashMap<PathBuf, Arc<texture::Texels>>,
     texture_memory: texture::Memory,
     meshes: HashMap<PathBuf, Vec<u8>>,
+    /// Every file that a property names.
+    files: RefCell<BTreeSet<PathBuf>>,
     nesting: usize,
     /// Objects that what is being built goes through so far.
     cost: usize,
@@ -96,6 +99,7 @@ pub fn load(path: &Path, options: &Options) -> Result<Scene> {
         bitmaps: HashMap::new(),
         texture_memory: texture::Memory::new(options.texture_memory),
         meshes: HashMap::new(),
+        files: RefCell::default(),
         nesting: 0,
         cost: 0,
         attributes: Vec::new(),
@@ -125,7 +129,8 @@ pub fn load(path: &Path, options: &Options) -> Result<Scene> {
     let groups = groups.into_values();
     let grouped = groups.iter().flat_map(|group| &group.shapes);
     texture::bind(loader.attributes, shapes.iter().chain(grouped).map(|shape| &shape.geometry))?;
-    let parts = Parts { shapes, groups, emitters, sensor, integrator, fingerprint };
+    let files = loader.files.into_inner().into_iter().collect();
+    let parts = Parts { shapes, groups, emitters, sensor, integrator, fingerprint, files };
     Scene::build(parts, options.threads).map_err(|error| match error {
         Error::Usage(what) => place.invalid(what),
         other => other,
@@ -302,11 +307,13 @@ impl Loader {
             return Err(object.place.invalid(format!("{} `{}` needs a `filename`", object.class, object.plugin)));
         }
         let mut candidates = self.tree.folders.iter().map(|folder| folder.join(&name));
-        candidates.find(|path| path.is_file()).ok_or_else(|| {
+        let found = candidates.find(|path| path.is_file()).ok_or_else(|| {
             let folders: Vec<_> = self.tree.folders.iter().map(|folder| folder.display().to_string()).collect();
             let what = format!("no file `{name}` in {}", folders.join(" or "));
             object.place_of("filename").invalid(what)
-        })
+        })?;
+        self.files.borrow_mut().insert(found.clone());
+        Ok(found)
     }
 
     /// The texels of an image file, read once.

@@ -4,11 +4,14 @@ pub mod half_vector;
 pub mod reconnect;
 mod walk;
 
+use serde::{Deserialize, Serialize};
+
 pub use self::walk::{Room, Walk};
 use crate::math::Rgb;
 
 /// How the base path of a pixel becomes a path of its neighbour.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Shift {
     /// Reconnection where both paths scatter diffusely, half-vector copies elsewhere.
     Reconnect {

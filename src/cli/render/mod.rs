@@ -1,23 +1,27 @@
 //! `fluxion render`.
 
+mod job;
+
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 use anyhow::{Result, bail};
 use clap::builder::{PossibleValue, PossibleValuesParser};
-use fluxion::adaptive::{self, ALLOCATORS, Allocator, Limits};
+use fluxion::adaptive::{ALLOCATORS, Allocator, Begun};
+use fluxion::checkpoint::{Origin, Run, content};
 use fluxion::error::Error;
-use fluxion::film::{Frame, Needs, exr};
+use fluxion::film::Needs;
 use fluxion::plan::Plan;
-use fluxion::reconstruct::{Reconstruction, Solution};
 use fluxion::render::gradient::shift::{SHIFTS, Shift};
-use fluxion::render::{self, Budget, Control, Outcome, SampleId, Settings};
+use fluxion::render::{self, Outcome, SampleId};
 use fluxion::scene::{Scene, load};
 
+use self::job::Job;
 use super::outputs::Claims;
 use super::stats::Stats;
-use super::{method, progress, stats};
+use super::{checkpoint, method, progress, stats};
 
 /// Options of `render`.
 #[derive(clap::Args)]
@@ -42,6 +46,12 @@ pub struct Args {
     /// Seed of the random numbers; the same seed gives the same bits on any number of threads
     #[arg(long, default_value_t = 0)]
     seed: u64,
+    /// Number of the first sample of every pixel: films that go on where others end have samples that are spread better
+    /// than those of other seeds
+    #[arg(long, default_value_t = 0, hide_short_help = true, value_name = "N")]
+    first: u32,
+    #[command(flatten)]
+    keep: checkpoint::Args,
     /// Threads to work with (0: one per core)
     #[arg(long, default_value_t = 0)]
     threads: usize,
@@ -115,7 +125,8 @@ fn parse_sample(text: &str) -> Result<(usize, usize, u32), String> {
 pub fn run(args: &Args) -> Result<ExitCode> {
     super::use_threads(args.threads)?;
     let method = args.method.make()?;
-    let _claims = Claims::new(&args.output, &[&args.layers, &args.json], &[&args.scene])?;
+    args.keep.check()?;
+    let _claims = Claims::new(&args.output, &[&args.layers, &args.json, &args.keep.checkpoint], &[&args.scene])?;
     let mut stats = Stats { method: args.method.method.clone(), ..Stats::default() };
     let start = Instant::now();
     let texture_memory = args.texture_memory << 20;
@@ -148,86 +159,40 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     if let Some(sample) = args.replay {
         return replay(args, &scene, sample);
     }
-    let (frame, solution) = if args.adaptive.is_some() || args.target_error.is_some() {
-        adaptive(args, &scene, method.as_ref(), &plan, &mut stats)?
-    } else {
-        let outcome = trace(args, &scene, plan.needs)?;
-        warn(args, &outcome);
-        stats.rendered(&outcome);
-        let start = Instant::now();
-        let mut frame = outcome.film.develop();
-        if method.needs().edges && !plan.needs.edges {
-            frame.fill_dark_edges();
-        }
-        frame.attributes = attributes(args, &scene, &stats);
-        stats.seconds.develop = start.elapsed().as_secs_f64();
-        save(args, &frame, &mut stats)?;
-        let solution = args.method.solve(method.as_ref(), &frame, args.quiet, &mut stats)?;
-        (frame, solution)
+    let origin = args.keep.checkpoint.as_ref().map(|_| origin(args, &scene, &plan)).transpose()?;
+    let journal = Mutex::default();
+    let begun = match origin.as_ref().map(|origin| args.keep.load(origin)).transpose()?.flatten() {
+        Some(checkpoint) => checkpoint.begun(&journal),
+        None => Begun { render: Outcome::new(&scene, plan.needs), journal: &journal },
     };
-    method::write(&args.output, &solution, &frame, &mut stats)?;
-    if let Some(path) = &args.json {
-        stats.save(path)?;
+    let keeper = origin.and_then(|origin| args.keep.keeper(origin, &begun));
+    let made = Job { args, scene: &scene, method: method.as_ref(), plan: &plan, keeper: keeper.as_ref() }
+        .run(begun, &mut stats);
+    match &keeper {
+        Some(keeper) => keeper.conclude(made)?,
+        None => made?,
     }
     report(args, &stats);
     Ok(ExitCode::SUCCESS)
 }
 
-/// Saves the layers, if they are asked for.
-fn save(args: &Args, frame: &Frame, stats: &mut Stats) -> Result<()> {
-    if let Some(path) = &args.layers {
-        let start = Instant::now();
-        exr::save(path, frame)?;
-        stats.seconds.write += start.elapsed().as_secs_f64();
-    }
-    Ok(())
+/// What the samples are going to be taken of.
+fn origin(args: &Args, scene: &Scene, plan: &Plan) -> Result<Origin> {
+    Ok(Origin {
+        version: env!("CARGO_PKG_VERSION").into(),
+        scene: args.scene.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+        content: content(scene)?,
+        size: (scene.sensor().width, scene.sensor().height),
+        needs: plan.needs,
+        dark: plan.is_dark(),
+        shift: shift(args),
+        runs: vec![Run { seed: args.seed, first: args.first, samples: 0 }],
+    })
 }
 
 fn allocator_names() -> PossibleValuesParser {
     let name = |allocator: &&dyn Allocator| PossibleValue::new(allocator.id()).help(allocator.summary());
     ALLOCATORS.iter().map(name).collect::<Vec<_>>().into()
-}
-
-/// Renders and reconstructs in passes.
-fn adaptive(
-    args: &Args,
-    scene: &Scene,
-    method: &dyn Reconstruction,
-    plan: &Plan,
-    stats: &mut Stats,
-) -> Result<(Frame, Solution)> {
-    let limits = Limits {
-        // Without any limit the scene says how much.
-        spp: args.spp.or((args.time.is_none() && args.target_error.is_none()).then_some(scene.sensor().spp)),
-        time: args.time,
-        error: args.target_error,
-    };
-    let settings = adaptive::Settings {
-        render: settings(args, plan.needs, Budget::Spp(1)),
-        method,
-        allocator: adaptive::allocator(args.adaptive.as_deref().unwrap_or("uniform"))?,
-        limits,
-        reconstruction: None,
-        lit: plan.needs.edges || !method.needs().edges,
-    };
-    let stop = super::stop_on_interrupt()?;
-    let bar = progress::bar(args.quiet);
-    bar.set_message("rendering");
-    let report = |share| progress::set(&bar, share);
-    let context = args.method.context(&|_, _| ());
-    let outcome = adaptive::run(scene, &settings, &Control { stop: &stop, progress: &report }, &context)?;
-    bar.finish_and_clear();
-    let adaptive::Outcome { render, mut frame, solution, passes, develop, reconstruct } = outcome;
-    warn(args, &render);
-    stats.rendered(&render);
-    (stats.seconds.develop, stats.seconds.reconstruct, stats.passes) = (develop, reconstruct, passes);
-    frame.attributes = attributes(args, scene, stats);
-    save(args, &frame, stats)?;
-    args.method.write_notes(&solution, &frame)?;
-    if let (false, Some(error)) = (args.quiet, stats.passes.last().and_then(|pass| pass.error)) {
-        eprintln!("estimated relMSE {error:.2e} after {} passes", stats.passes.len());
-    }
-    Ok((frame, solution))
 }
 
 fn shift_names() -> PossibleValuesParser {
@@ -240,58 +205,6 @@ fn shift(args: &Args) -> Shift {
         (Shift::Reconnect { .. }, Some(threshold)) => Shift::Reconnect { threshold },
         (shift, _) => shift,
     }
-}
-
-fn settings(args: &Args, needs: Needs, budget: Budget) -> Settings {
-    Settings { budget, seed: args.seed, first: 0, needs, shift: shift(args) }
-}
-
-fn trace(args: &Args, scene: &Scene, needs: Needs) -> Result<Outcome> {
-    let stop = super::stop_on_interrupt()?;
-    let budget = match args.time {
-        Some(time) => Budget::Time(time),
-        None => Budget::Spp(args.spp.unwrap_or(scene.sensor().spp)),
-    };
-    let settings = settings(args, needs, budget);
-    let bar = progress::bar(args.quiet);
-    bar.set_message("rendering");
-    let report = |share| progress::set(&bar, share);
-    let outcome = render::render(scene, settings, &Control { stop: &stop, progress: &report });
-    bar.finish_and_clear();
-    Ok(outcome)
-}
-
-fn warn(args: &Args, outcome: &Outcome) {
-    if outcome.stopped {
-        eprintln!("warning: stopped early; the image has up to {} samples per pixel", outcome.spp);
-    }
-    if let Some((id, reason)) = outcome.first_rejected {
-        let (count, SampleId { x, y, index, seed }) = (outcome.film.rejected(), id);
-        eprintln!("warning: {count} samples were not finite ({}) and count as zero; the first one again:", reason.0);
-        let (width, height) = (outcome.film.width, outcome.film.height);
-        let threshold = args.shift_threshold.map_or(String::new(), |alpha| format!(" --shift-threshold {alpha}"));
-        let definitions: String = args.define.iter().map(|(name, value)| format!(" -D '{name}={value}'")).collect();
-        eprintln!(
-            "  fluxion render {} --size {width}x{height} --seed {seed} --shift {}{threshold}{definitions} \
-             --replay {x},{y},{index}",
-            args.scene.display(),
-            args.shift
-        );
-    }
-}
-
-fn attributes(args: &Args, scene: &Scene, stats: &Stats) -> Vec<(String, String)> {
-    let pairs = [
-        ("fluxion:version", env!("CARGO_PKG_VERSION").to_owned()),
-        ("fluxion:scene", args.scene.file_name().unwrap_or_default().to_string_lossy().into_owned()),
-        ("fluxion:fingerprint", format!("{:016x}", scene.fingerprint())),
-        ("fluxion:seed", args.seed.to_string()),
-        ("fluxion:spp", stats.spp.to_string()),
-        ("fluxion:seconds", format!("{:.3}", stats.seconds.render)),
-        ("fluxion:method", args.method.method.clone()),
-        ("fluxion:plan", stats.plan.clone()),
-    ];
-    pairs.map(|(name, value)| (name.to_owned(), value)).to_vec()
 }
 
 fn report(args: &Args, stats: &stats::Stats) {

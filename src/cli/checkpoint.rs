@@ -1,0 +1,141 @@
+//! Checkpoints of `render`: when they are written, and what they are gone on with.
+
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard};
+use std::time::{Duration, Instant};
+
+use anyhow::{Result, bail};
+use fluxion::adaptive::{Begun, Journal};
+use fluxion::checkpoint::{self, Checkpoint, Origin};
+use fluxion::error::Error;
+use fluxion::render::{self, Outcome};
+
+use super::progress;
+
+/// Options of checkpoints.
+#[derive(clap::Args)]
+pub struct Args {
+    /// File to keep all samples in from time to time, so that an interrupted render can be gone on with
+    #[arg(long, value_name = "FILE")]
+    pub checkpoint: Option<PathBuf>,
+    /// Time between checkpoints; longer ones are taken less often, so that they use at most a twentieth of the time
+    #[arg(long, default_value = "60s", value_parser = super::parse_time, requires = "checkpoint", value_name = "TIME")]
+    checkpoint_every: Duration,
+    /// Go on with what the checkpoint holds, if it is there already
+    #[arg(long, requires = "checkpoint")]
+    resume: bool,
+}
+
+/// Most of the time that writing checkpoints may take.
+const SHARE: u32 = 20;
+
+impl Args {
+    /// Fails if there is a checkpoint already which is not to be gone on with. To be asked before the file is claimed.
+    pub fn check(&self) -> Result<()> {
+        match &self.checkpoint {
+            Some(path) if !self.resume && is_there(path) => bail!(Error::Usage(format!(
+                "{} is there already: go on with it by --resume, or remove it first",
+                path.display()
+            ))),
+            _ => Ok(()),
+        }
+    }
+
+    /// What is to be gone on with: nothing, unless it is asked for and there.
+    pub fn load(&self, wanted: &Origin) -> Result<Option<Checkpoint>> {
+        let Some(path) = self.checkpoint.as_ref().filter(|path| self.resume && is_there(path)) else {
+            return Ok(None);
+        };
+        let checkpoint = checkpoint::load(path)?;
+        checkpoint.origin.resumes(wanted).map_err(|why| Error::io(path, why))?;
+        Ok(Some(checkpoint))
+    }
+
+    /// Who keeps a render of this origin; none if nobody is asked to.
+    pub fn keeper<'a>(&'a self, origin: Origin, begun: &Begun<'a>) -> Option<Keeper<'a>> {
+        let now = Instant::now();
+        let kept = begun.render.film.samples();
+        let state = State { next: now + self.checkpoint_every, kept, taken: now, failed: None };
+        let (path, every) = (self.checkpoint.as_deref()?, self.checkpoint_every);
+        Some(Keeper { path, every, origin, journal: begun.journal, state: Mutex::new(state) })
+    }
+}
+
+fn is_there(path: &Path) -> bool {
+    std::fs::metadata(path).is_ok_and(|found| found.len() > 0)
+}
+
+/// Writes checkpoints while a render is under way.
+pub struct Keeper<'a> {
+    path: &'a Path,
+    every: Duration,
+    origin: Origin,
+    journal: &'a Mutex<Journal>,
+    state: Mutex<State>,
+}
+
+struct State {
+    next: Instant,
+    /// Samples in the last good checkpoint, and when it was taken.
+    kept: u64,
+    taken: Instant,
+    /// Why the last one that was tried could not be written.
+    failed: Option<Error>,
+}
+
+impl Keeper<'_> {
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
+    }
+
+    /// What becomes of a render: it has failed, too, if its last samples could not be kept; and where it has, samples
+    /// may be kept all the same.
+    pub fn conclude(&self, made: Result<()>) -> Result<()> {
+        let mut state = self.state();
+        match (made, state.failed.take()) {
+            (Ok(()), None) => Ok(()),
+            (Ok(()), Some(failed)) => Err(failed.into()),
+            (Err(error), _) if state.kept == 0 => Err(error),
+            (Err(error), _) => Err(error.context(format!(
+                "the samples are kept: `fluxion reconstruct {}` makes an image of them",
+                self.path.display()
+            ))),
+        }
+    }
+
+    /// Writes what there is now. The error says what is still there.
+    fn save(&self, outcome: &Outcome) -> Result<(), Error> {
+        let journal = self.journal.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        // Runs that decide nothing write nothing down.
+        let decided = !journal.notes.passes.is_empty() || !journal.goals.is_empty();
+        let start = Instant::now();
+        let saved = checkpoint::save(self.path, &self.origin, outcome, decided.then_some(&*journal));
+        let mut state = self.state();
+        state.next = Instant::now() + self.every.max(start.elapsed() * SHARE);
+        saved.inspect(|()| (state.kept, state.taken) = (outcome.film.samples(), start)).map_err(|error| {
+            let pixels = (outcome.film.width * outcome.film.height) as f64;
+            let kept = match (state.kept as f64 / pixels, progress::seconds(state.taken.elapsed())) {
+                (0.0, _) => "no checkpoint is kept yet".to_owned(),
+                (spp, ago) => format!("the checkpoint of {ago} ago is kept, with {spp:.1} samples per pixel"),
+            };
+            match error {
+                Error::Io { path, what } => Error::io(&path, format!("{what}; {kept}")),
+                other => other,
+            }
+        })
+    }
+}
+
+impl render::Keeper for Keeper<'_> {
+    fn due(&self) -> bool {
+        Instant::now() >= self.state().next
+    }
+
+    fn keep(&self, outcome: &Outcome) {
+        let failed = self.save(outcome).err();
+        if let Some(error) = &failed {
+            eprintln!("warning: no new checkpoint: {error}");
+        }
+        self.state().failed = failed;
+    }
+}
