@@ -34,5 +34,7 @@ pub mod metrics;
 pub mod reference;
 pub mod validate;
 
+pub mod stress;
+
 pub mod bench;
 pub mod report;

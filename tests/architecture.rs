@@ -21,8 +21,9 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("metrics", &["image", "math"]),
     ("reference", &["scene", "film", "render", "image", "math"]),
     ("validate", &["scene", "reference", "image"]),
+    ("stress", &["scene", "render", "film", "image", "reconstruct", "solve", "math", "files"]),
     ("bench", &["scene", "plan", "film", "render", "image", "math", "reconstruct", "adaptive", "reference", "metrics"]),
-    ("report", &["bench", "image", "math", "metrics"]),
+    ("report", &["bench", "stress", "image", "math", "metrics"]),
 ];
 
 /// Files that may use `ffi`; everything else goes through them.

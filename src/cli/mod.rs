@@ -12,6 +12,7 @@ mod reconstruct;
 mod reference;
 mod render;
 mod stats;
+mod stress;
 mod validate;
 
 use std::process::ExitCode;
@@ -46,6 +47,8 @@ enum Command {
     Merge(merge::Args),
     /// Show what a scene holds and needs, or what Fluxion knows
     Info(info::Args),
+    /// Try hostile frames, systems and scenes: numerical stability, as a table
+    Stress(stress::Args),
     /// Render bundled scenes and check them against their references
     Validate(validate::Args),
 }
@@ -60,6 +63,7 @@ pub fn run(args: Args) -> Result<ExitCode> {
         Command::Reference(args) => reference::run(&args),
         Command::Merge(args) => merge::run(&args),
         Command::Info(args) => info::run(&args),
+        Command::Stress(args) => stress::run(&args),
         Command::Validate(args) => validate::run(&args),
     }
 }

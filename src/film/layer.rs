@@ -219,6 +219,12 @@ const OF_BIN: [fn(u8) -> Layer; BINNED.len()] =
     [Layer::BinColor, Layer::BinDx, Layer::BinDy, Layer::BinAmbient, Layer::BinAmbientDx, Layer::BinAmbientDy];
 
 impl Layer {
+    /// Whether a value below zero is a mistake: variances and counts. Radiance may be negative where someone has filtered
+    /// it.
+    pub fn is_never_negative(self) -> bool {
+        matches!(self, Self::Samples | Self::Rejected) || self.info().name.ends_with("variance")
+    }
+
     /// Number of layers.
     pub const COUNT: usize = SINGLE.len() + BINNED.len() * BINS;
 

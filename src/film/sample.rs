@@ -65,16 +65,21 @@ impl Rejected {
     }
 }
 
+/// Values beyond this have squares whose sum over a million samples is no longer a float.
+const LARGEST: f32 = 1e16;
+
 impl Sample {
+    /// Fails on what is no number, and on numbers that would make the variance none.
     pub(super) fn check(&self) -> Result<(), Rejected> {
         let finite = |ok: bool, what| if ok { Ok(()) } else { Err(Rejected(what)) };
-        finite(self.color.is_finite(), "color")?;
-        finite(self.direct.is_finite(), "direct")?;
+        let value = |value: f32| value.abs() <= LARGEST;
+        let color = |color: &Rgb| color.abs().max_element() <= LARGEST && !color.is_nan();
+        finite(color(&self.color), "color")?;
+        finite(color(&self.direct), "direct")?;
         let mut features = self.features.to_array().into_iter().chain(self.features.place());
-        finite(features.all(f32::is_finite), "features")?;
-        let Bin { color, edges } = &self.ambient;
-        finite(color.is_finite() && edges.iter().all(|edge| edge.is_finite()), "ambient light")?;
-        finite(self.edges.iter().all(|edge| edge.is_finite()), "edges")
+        finite(features.all(value), "features")?;
+        finite(color(&self.ambient.color) && self.ambient.edges.iter().all(color), "ambient light")?;
+        finite(self.edges.iter().all(color), "edges")
     }
 }
 

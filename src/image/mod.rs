@@ -77,7 +77,12 @@ impl Image {
 
     /// Column, row and channel of the first sample that is not finite.
     pub fn not_finite(&self) -> Option<(usize, usize, usize)> {
-        let at = self.data.iter().position(|value| !value.is_finite())?;
+        self.find(|value| !value.is_finite())
+    }
+
+    /// Column, row and channel of the first sample of which something holds.
+    pub fn find(&self, holds: impl Fn(f32) -> bool) -> Option<(usize, usize, usize)> {
+        let at = self.data.iter().position(|&value| holds(value))?;
         let pixel = at / self.channels;
         Some((pixel % self.width, pixel / self.width, at % self.channels))
     }

@@ -13,6 +13,9 @@ use crate::solve::graph::Quad;
 /// Share of the mean variance around it that a colour's variance is raised to.
 pub const FLOOR: f32 = 0.5;
 
+/// The least luminance that is told from none: the square of one over it is still a float.
+const LEAST_LUMINANCE: f32 = 1e-18;
+
 /// Scattered radiance, as layers of a frame.
 pub struct Inputs<'a> {
     /// Where they come from.
@@ -30,7 +33,8 @@ pub struct Inputs<'a> {
 impl<'a> Inputs<'a> {
     /// The inputs of a frame, mirrored until both sides are multiples of `multiple`.
     pub fn new(frame: &'a Frame, multiple: usize) -> Result<Self> {
-        let scale = 1.0 / typical_luminance(frame.require(Layer::Color)?);
+        // Where hardly anything shines, the scale is still a number.
+        let scale = 1.0 / typical_luminance(frame.require(Layer::Color)?).max(LEAST_LUMINANCE);
         let samples = &frame.require(Layer::Samples)?.data;
         let spp = (samples.iter().map(|&n| f64::from(n)).sum::<f64>() / samples.len() as f64).max(1.0) as f32;
         let (width, height) = (frame.width.next_multiple_of(multiple), frame.height.next_multiple_of(multiple));

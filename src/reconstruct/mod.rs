@@ -120,11 +120,15 @@ pub fn parse(text: &str) -> Result<Box<dyn Reconstruction>> {
     (method.make)(&Parameters::parse(method, values)?)
 }
 
-/// Reconstructs a frame: checks that it is finite, and adds the directly seen emitters to the method's image.
+/// Reconstructs a frame: checks that its values make sense, and adds the directly seen emitters to the method's image.
 pub fn solve(method: &dyn Reconstruction, frame: &Frame, context: &Context) -> Result<Solution> {
     for (layer, image) in frame.present() {
         if let Some((x, y, c)) = image.not_finite() {
             let what = format!("channel {} is not finite at pixel {x},{y}", layer.channel_names()[c]);
+            return Err(Error::Usage(what));
+        }
+        if let Some((x, y, c)) = image.find(|value| value < 0.0).filter(|_| layer.is_never_negative()) {
+            let what = format!("channel {} is negative at pixel {x},{y}", layer.channel_names()[c]);
             return Err(Error::Usage(what));
         }
     }

@@ -3,6 +3,7 @@
 mod changes;
 mod page;
 mod picture;
+pub mod stress;
 mod summary;
 
 pub use self::changes::{Change, changes};

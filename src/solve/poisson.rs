@@ -26,6 +26,9 @@ pub fn screened(width: usize, data: &[f64], dx: &[f64], dy: &[f64], alpha: f64) 
     });
     let dct = Dct2::new(width, height);
     dct.forward(&mut right);
+    // Differences leave the mean to the data. Of the sum above only rounding would be left if the screen is weak, and it
+    // would be divided by the screen.
+    right[0] = screen * data.iter().sum::<f64>();
     let eigenvalues = |n: usize| (0..n).map(move |k| 4.0 * (PI * k as f64 / (2 * n) as f64).sin().powi(2));
     let across: Vec<f64> = eigenvalues(width).collect();
     let down: Vec<f64> = eigenvalues(height).collect();

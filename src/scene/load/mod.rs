@@ -83,7 +83,16 @@ pub struct Loader {
 
 /// Loads a scene file with everything it refers to.
 pub fn load(path: &Path, options: &Options) -> Result<Scene> {
-    let tree = xml::parse(path, &options.parameters)?;
+    build(path, xml::parse(path, None, &options.parameters)?, options)
+}
+
+/// Loads a scene from the text of a scene file. What it refers to is looked for in the current folder.
+pub fn load_text(text: &str, options: &Options) -> Result<Scene> {
+    let path = Path::new("scene.xml");
+    build(path, xml::parse(path, Some(text), &options.parameters)?, options)
+}
+
+fn build(path: &Path, tree: xml::Tree, options: &Options) -> Result<Scene> {
     let objects = tree.objects.clone();
     // Definitions that the text asks for belong to it.
     let used = |name: &str| tree.sources.iter().any(|source| source.contains(&format!("${name}")));

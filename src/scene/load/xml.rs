@@ -35,13 +35,16 @@ pub struct Tree {
     pub sources: Vec<String>,
 }
 
-/// Reads a scene file. `parameters` override the file's `<default>` values.
-pub fn parse(path: &Path, parameters: &[(String, String)]) -> Result<Tree> {
+/// Reads a scene file, or `text` in its place. `parameters` override the file's `<default>` values.
+pub fn parse(path: &Path, text: Option<&str>, parameters: &[(String, String)]) -> Result<Tree> {
     let folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
     let tree = Tree { objects: Vec::new(), ids: HashMap::new(), folders: vec![folder], sources: Vec::new() };
     let defaults = parameters.iter().cloned().collect();
     let mut parser = Parser { tree, defaults, aliases: Vec::new(), includes: Vec::new(), depth: 0, legacy: false };
-    parser.file(path)?;
+    match text {
+        Some(text) => parser.text(path, text.to_owned())?,
+        None => parser.file(path)?,
+    }
     for (id, alias, place) in std::mem::take(&mut parser.aliases) {
         let object = parser.tree.ids.get(&id).cloned();
         let object = object.ok_or_else(|| place.invalid(format!("alias of the unknown id `{id}`")))?;
@@ -99,7 +102,11 @@ impl<'a> At<'a> {
 
 impl Parser {
     fn file(&mut self, path: &Path) -> Result<()> {
-        let text = std::fs::read_to_string(path).map_err(|error| Error::io(path, error))?;
+        self.text(path, std::fs::read_to_string(path).map_err(|error| Error::io(path, error))?)
+    }
+
+    /// Text that stands in a file, or might.
+    fn text(&mut self, path: &Path, text: String) -> Result<()> {
         let place = |row: u32| Place::line(path, row);
         let document = Document::parse(&text).map_err(|error| place(error.pos().row).invalid(error.to_string()))?;
         let file = File::new(path, &text);
@@ -116,7 +123,7 @@ impl Parser {
         for at in root.children() {
             self.top_level(at)?;
         }
-        self.tree.sources.push(text.clone());
+        self.tree.sources.push(text);
         self.legacy = outer;
         Ok(())
     }
