@@ -7,6 +7,9 @@ use std::process::ExitCode;
 use clap::Parser;
 use fluxion::error::Error;
 
+#[global_allocator]
+static ALLOCATOR: fluxion::ffi::memory::Allocator = fluxion::ffi::memory::Allocator;
+
 fn main() -> ExitCode {
     match cli::run(cli::Args::parse()) {
         Ok(code) => code,

@@ -8,6 +8,7 @@ use anyhow::{Result, bail};
 use fluxion::adaptive::{Begun, Journal};
 use fluxion::checkpoint::{self, Checkpoint, Origin};
 use fluxion::error::Error;
+use fluxion::ffi::memory::say_what_is_kept;
 use fluxion::render::{self, Outcome};
 
 use super::progress;
@@ -57,6 +58,7 @@ impl Args {
         let kept = begun.render.film.samples();
         let state = State { next: now + self.checkpoint_every, kept, taken: now, failed: None };
         let (path, every) = (self.checkpoint.as_deref()?, self.checkpoint_every);
+        say_what_is_kept(format!("; the last checkpoint is kept in {}", path.display()));
         Some(Keeper { path, every, origin, journal: begun.journal, state: Mutex::new(state) })
     }
 }

@@ -9,8 +9,9 @@ use crate::math::lanes::{Bits, Lanes, Lanes3, Mask};
 use crate::scene::emitter::LightPoint;
 use crate::scene::{Integrator, Scene};
 
-/// Chance of surviving Russian roulette is never above this, so that paths in white rooms end.
-const MAX_SURVIVAL: f32 = 0.95;
+/// Chance of surviving Russian roulette is never above this, so that paths in white rooms end. What is reflected r times
+/// over has finite variance as long as r² is below it: 0.95, which is common, is too little for white walls.
+const MAX_SURVIVAL: f32 = 0.99;
 
 /// An emitter that a path has run into.
 pub struct Met {

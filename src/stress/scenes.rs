@@ -10,6 +10,11 @@ use crate::error::Result;
 pub const CASES: &[Case] = &[
     Case { name: "scenes/scale", summary: "a lit floor in units from 1e-5 to 1e7", run: scale },
     Case { name: "scenes/far", summary: "the same far from the origin", run: far },
+    Case {
+        name: "scenes/large",
+        summary: "the same on floors up to a million times as wide as the lamp is high",
+        run: large,
+    },
     Case { name: "scenes/unequal", summary: "emitters of 1e-6 and 1e9, each in its own room", run: unequal },
     Case { name: "scenes/slit", summary: "a point of light behind a slit", run: slit },
     Case { name: "scenes/grazing", summary: "light along a floor, up to 1e-4 from its plane", run: grazing },
@@ -33,15 +38,16 @@ fn below(area: f64, d: f64) -> f64 {
     area / (d * d)
 }
 
-/// A floor of reflectance 0.5 under a small square light of radiance one, all of it `unit` times as large and around `at`.
+/// A floor of reflectance 0.5 under a small square light of radiance one, all of it `unit` times as
+/// large and around `at`; the floor is `width` wide.
 /// The camera sees so little of the floor that it is as bright as its middle.
-fn lit_floor(unit: f32, at: f32) -> Result<(Probe, f64)> {
+fn lit_floor(unit: f32, at: f32, width: f32) -> Result<(Probe, f64)> {
     let place = |y: f32| [at, at + unit * y, at];
     let point = |p: [f32; 3]| format!("{},{},{}", p[0], p[1], p[2]);
     let eye = [at, at + unit * 1.0, at + unit * 1.0];
     let elements = [
         camera(&point(eye), &point(place(0.0)), 0.5),
-        square(place(0.0), [0.0, 1.0, 0.0], 4.0 * unit, &grey(0.5)),
+        square(place(0.0), [0.0, 1.0, 0.0], width * unit, &grey(0.5)),
         square(place(2.0), [0.0, -1.0, 0.0], 0.2 * unit, &glow(1.0)),
     ];
     // Closed form of a square above a point, to second order in its size.
@@ -51,7 +57,7 @@ fn lit_floor(unit: f32, at: f32) -> Result<(Probe, f64)> {
 
 fn scale(checks: &mut Checks) -> Result<()> {
     for unit in [1e-5, 1e-3, 1.0, 1e4, 1e7] {
-        let (probe, exact) = lit_floor(unit, 0.0)?;
+        let (probe, exact) = lit_floor(unit, 0.0, 4.0)?;
         probe.check(checks, &format!("units of {unit:.0e}"), exact, 0.02)?;
     }
     Ok(())
@@ -59,8 +65,16 @@ fn scale(checks: &mut Checks) -> Result<()> {
 
 fn far(checks: &mut Checks) -> Result<()> {
     for at in [1e2, 1e3] {
-        let (probe, exact) = lit_floor(1.0, at)?;
+        let (probe, exact) = lit_floor(1.0, at, 4.0)?;
         probe.check(checks, &format!("at {at:.0e}"), exact, 0.02)?;
+    }
+    Ok(())
+}
+
+fn large(checks: &mut Checks) -> Result<()> {
+    for width in [1e2, 1e3, 1e4, 1e5, 1e6] {
+        let (probe, exact) = lit_floor(1.0, 0.0, width)?;
+        probe.check(checks, &format!("{width:.0e} wide"), exact, 0.02)?;
     }
     Ok(())
 }
@@ -192,6 +206,9 @@ fn ball(x: f32, radius: f32, material: &str) -> String {
     )
 }
 
+/// For balls that are seen from inside.
+const FLIPPED: &str = r#"<boolean name="flip_normals" value="true"/>"#;
+
 const GLASS: &str =
     r#"<bsdf type="dielectric"><float name="int_ior" value="1.5"/><float name="ext_ior" value="1"/></bsdf>"#;
 
@@ -251,8 +268,20 @@ fn depth(checks: &mut Checks) -> Result<()> {
     let view = camera("0,0,0", "0.3,0.2,1", 60.0);
     Probe::new(&[view.clone(), cube(&grey(0.9))], 1, 16)?.check(checks, "one edge", 1.0, 1e-5)?;
     Probe::new(&[view.clone(), cube(&grey(0.9))], 2, 64)?.check(checks, "two edges", 1.9, 0.01)?;
-    // A room in which light is reflected a hundred times on average.
-    Probe::new(&[view, cube(&grey(0.99))], 10_000, 64)?.check(checks, "ten thousand edges", 100.0, 0.05)
+    // Rooms in which light is reflected a hundred times on average: one without edges, and one whose walls meet. Rays
+    // start a little off their surfaces, which next to an edge is beyond the other wall.
+    let inside = format!("{}{}", grey(0.99), glow(1.0));
+    Probe::new(&[view.clone(), ball(0.0, 1.0, &format!("{FLIPPED}{inside}"))], 10_000, 16)?.check(
+        checks,
+        "ten thousand edges",
+        100.0,
+        0.02,
+    )?;
+    let means = Probe::new(&[view, cube(&grey(0.99))], 10_000, 64)?.means();
+    let mean = means.iter().sum::<f64>() / means.len() as f64;
+    // The sum of a geometric series whose ratio is 0.99 less the loss.
+    checks.add("a room with edges", "light lost per reflection", 0.99 - (1.0 - 1.0 / mean), 1e-3);
+    Ok(())
 }
 
 fn mirrors(checks: &mut Checks) -> Result<()> {
@@ -277,16 +306,14 @@ fn corridor(checks: &mut Checks) -> Result<()> {
     ];
     // Heights of 1, 3, ... 19 after ten reflections.
     Probe::new(&elements, 20, 16)?.check(checks, "mirrors", 0.8f64.powi(10), 0.01)?;
-    // Ten diffuse floors of a tower, each of which sees only the next through a hole: there is no closed answer, but
-    // the light that arrives scales with the lamp.
+    // A tower with ten floors of half its width each: there is no closed answer, but what arrives scales with the lamp.
     let tower = |radiance: f32| {
         let mut parts = vec![camera("0,0.5,0", "0.3,0,0.4", 40.0)];
         for floor in 0..10 {
-            let y = floor as f32;
-            let hole = if floor % 2 == 0 { 0.6 } else { -0.6 };
+            // Each floor fills one half of the tower, the next one the other.
+            let (x, y) = (if floor % 2 == 0 { 0.5 } else { -0.5 }, floor as f32);
             parts.push(format!(
-                r#"<shape type="rectangle"><transform name="to_world"><scale x="0.8" y="1"/><rotate x="1" angle="-90"/><translate x="{}" y="{y}"/></transform>{}</shape>"#,
-                -0.25 * hole / 0.6 * 0.8,
+                r#"<shape type="rectangle"><transform name="to_world"><scale x="0.5" y="1"/><rotate x="1" angle="-90"/><translate x="{x}" y="{y}"/></transform>{}</shape>"#,
                 grey(0.9)
             ));
         }

@@ -222,7 +222,7 @@ impl Blend {
             let (own, leverage) = (smooth.at(0, x, y), self.leverage.at(0, x, y));
             let unbiased = unbiased.at(0, x, y).max(leverage * own);
             // Squares, so that the better one has nearly all the weight.
-            let share = if unbiased > 0.0 { unbiased.powi(2) / (unbiased.powi(2) + own.powi(2)) } else { 0.0 };
+            let share = if unbiased > 0.0 { unbiased / (unbiased + own * (own / unbiased)) } else { 0.0 };
             let (rest, error) = (1.0 - share, error.at(0, x, y).max(leverage * own));
             [share, rest * rest * error + share * (share + 2.0 * rest * leverage) * own][c]
         });
