@@ -1,8 +1,11 @@
 #include "oiio.h"
 
+#include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 #include <OpenImageIO/texture.h>
 
+#include <cerrno>
+#include <cstdio>
 #include <cstring>
 #include <exception>
 #include <memory>
@@ -111,6 +114,22 @@ extern "C" bool fluxion_image_write(const char *path, const FluxionImageSpec *wa
   for (int i = 0; i < wanted->channels; ++i) spec.channelnames[i] = channels[i];
   if (compression) spec.attribute("compression", compression);
   for (size_t i = 0; i < attribute_count; ++i) spec.attribute(attributes[i].name, attributes[i].value);
+  /* Formats do not look at what comes of their last bytes: on a full disk they would leave a part of a file and call it
+   * done. So the file is ours. libjpeg even ends the program when it cannot write: images of eight bits, which are
+   * small, are made in memory. */
+  std::unique_ptr<std::FILE, int (*)(std::FILE *)> file(std::fopen(path, "wb"), std::fclose);
+  if (!file) {
+    fail(error, std::strerror(errno), "");
+    return false;
+  }
+  OIIO::Filesystem::IOFile direct(file.get(), OIIO::Filesystem::IOProxy::Write);
+  OIIO::Filesystem::IOVecOutput memory;
+  OIIO::Filesystem::IOProxy *proxy = &direct;
+  if (spec.format == OIIO::TypeDesc::UINT8) proxy = &memory;
+  if (!output->set_ioproxy(proxy)) {
+    fail(error, output->geterror(), "this format cannot be written safely");
+    return false;
+  }
   if (!output->open(path, spec) || !output->write_image(OIIO::TypeDesc::FLOAT, pixels)) {
     fail(error, output->geterror(), "the file could not be written");
     return false;
@@ -119,7 +138,13 @@ extern "C" bool fluxion_image_write(const char *path, const FluxionImageSpec *wa
     fail(error, output->geterror(), "the file could not be finished");
     return false;
   }
-  return true;
+  errno = 0;
+  const auto &bytes = memory.buffer();
+  bool whole = std::fwrite(bytes.data(), 1, bytes.size(), file.get()) == bytes.size();
+  whole = std::fflush(file.get()) == 0 && !std::ferror(file.get()) && whole;
+  whole = std::fclose(file.release()) == 0 && whole;
+  if (!whole) fail(error, errno ? std::strerror(errno) : "", "the end of the file could not be written");
+  return whole;
 } catch (const std::exception &exception) {
   fail(error, exception.what(), "writing the image failed");
   return false;

@@ -2,7 +2,7 @@
 # Fills the corpora from the bundled scenes, small mesh files first.
 set -eu
 cd "$(dirname "$0")"
-mkdir -p corpus/scene corpus/mesh
+mkdir -p corpus/scene corpus/mesh corpus/layers corpus/checkpoint
 for scene in ../scenes/*/scene.xml ../scenes/unit/*/scene.xml; do
 	name=$(basename "$(dirname "$scene")")
 	sed 's|\.\./\.\./assets|/nowhere|; s|\.\./assets|/nowhere|' "$scene" > "corpus/scene/$name.xml"
@@ -13,3 +13,13 @@ printf 'ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty floa
 put '\001' torus.ply < ../scenes/assets/torus_binary.ply
 put '\001' colors.ply < ../scenes/assets/torus_colors.ply
 put '\002' torus.serialized < ../scenes/assets/torus.serialized
+# Small ones, which the program makes itself. The target adds the checksum.
+fluxion=../target/release/fluxion
+for method in primal l2 frgr apr; do
+	$fluxion render ../scenes/unit/diffuse/scene.xml --size 5x4 --spp 2 -q --method $method -o corpus/out.exr \
+		--layers corpus/layers/$method.exr --checkpoint corpus/$method.ckpt
+	head -c -4 corpus/$method.ckpt > corpus/checkpoint/$method.ckpt
+done
+$fluxion render ../scenes/unit/diffuse/scene.xml --size 5x4 --spp 40 -q --adaptive -o corpus/out.exr --checkpoint corpus/a.ckpt
+head -c -4 corpus/a.ckpt > corpus/checkpoint/adaptive.ckpt
+rm corpus/out.exr corpus/*.ckpt

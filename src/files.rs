@@ -11,7 +11,7 @@ use crate::error::{Error, Result};
 pub fn replace(path: &Path, write: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
     let target = target(path);
     if fs::metadata(&target).is_ok_and(|found| !found.is_file()) {
-        return write(&target);
+        return write(path);
     }
     let part = part(&target);
     let swap = || {

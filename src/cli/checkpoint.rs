@@ -58,7 +58,7 @@ impl Args {
         let kept = begun.render.film.samples();
         let state = State { next: now + self.checkpoint_every, kept, taken: now, failed: None };
         let (path, every) = (self.checkpoint.as_deref()?, self.checkpoint_every);
-        say_what_is_kept(format!("; the last checkpoint is kept in {}", path.display()));
+        say_what_is_kept(format!("; the last checkpoint, if there was time for one, is kept in {}", path.display()));
         Some(Keeper { path, every, origin, journal: begun.journal, state: Mutex::new(state) })
     }
 }

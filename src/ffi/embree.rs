@@ -41,6 +41,9 @@ pub use raw::FluxionRays as Rays;
 /// What Embree's error callback has said, waiting to be fetched after the call that caused it.
 type Complaint = Mutex<Option<String>>;
 
+/// RTC_ERROR_OUT_OF_MEMORY.
+const OUT_OF_MEMORY: c_int = 4;
+
 /// A handle that is released once, after everything built from it.
 struct DeviceHandle {
     raw: *mut c_void,
@@ -71,7 +74,10 @@ unsafe extern "C" fn remember(user: *mut c_void, code: c_int, message: *const c_
     // SAFETY: Embree passes back the complaint's address given at creation, and a NUL-terminated string.
     let (complaint, message) = unsafe { (&*user.cast::<Complaint>(), CStr::from_ptr(message)) };
     let mut slot = complaint.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-    slot.get_or_insert_with(|| format!("{} (error code {code})", message.to_string_lossy()));
+    let message = message.to_string_lossy();
+    // Embree's own message says only that something failed.
+    let memory = if code == OUT_OF_MEMORY { ": out of memory" } else { "" };
+    slot.get_or_insert_with(|| format!("{message}{memory} (error code {code})"));
 }
 
 /// An Embree device: its threads and its error channel.

@@ -1,6 +1,7 @@
 //! Safe wrappers around the C libraries: the only unsafe code of the crate.
 
 pub mod embree;
+mod exr_header;
 pub mod memory;
 #[cfg(feature = "oidn")]
 pub mod oidn;

@@ -2,9 +2,10 @@
 #![allow(unsafe_code)]
 
 use std::ffi::{CStr, CString, c_char, c_void};
-use std::path::Path;
-use std::sync::Arc;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex};
 
+use super::exr_header;
 use super::raw::oiio as raw;
 use crate::error::{Error, Result};
 
@@ -74,6 +75,14 @@ impl Drop for ImageFile<'_> {
     }
 }
 
+fn check_header(path: &Path) -> Result<()> {
+    match exr_header::complaint(path) {
+        Ok(None) => Ok(()),
+        Ok(Some(what)) => Err(Error::io(path, what)),
+        Err(error) => Err(Error::io(path, error)),
+    }
+}
+
 fn path_string(path: &Path) -> Result<CString> {
     CString::new(path.as_os_str().as_encoded_bytes()).map_err(|_| Error::io(path, "the name holds a NUL byte"))
 }
@@ -94,6 +103,7 @@ impl<'a> ImageFile<'a> {
     /// Reads the header.
     pub fn open(path: &'a Path) -> Result<Self> {
         let bytes = std::fs::metadata(path).map_err(|error| Error::io(path, error))?.len() as usize;
+        check_header(path)?;
         let name = path_string(path)?;
         let mut spec = raw::FluxionImageSpec::default();
         let mut error = raw::FluxionError::default();
@@ -176,6 +186,15 @@ impl Drop for TextureSystem {
 pub struct CachedTexture {
     system: Arc<TextureSystem>,
     texture: *mut c_void,
+    path: PathBuf,
+}
+
+/// The first file whose texels could not be read, and how many there were in all.
+static FAILED: Mutex<Option<(PathBuf, u64)>> = Mutex::new(None);
+
+/// Lookups since the program started that found no texel since their file was gone or damaged, and the first such file.
+pub fn failed_lookups() -> Option<(PathBuf, u64)> {
+    FAILED.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).clone()
 }
 
 // SAFETY: as for the system that owns the texture.
@@ -195,6 +214,7 @@ impl TextureSystem {
 impl CachedTexture {
     /// Opens a file.
     pub fn open(system: &Arc<TextureSystem>, path: &Path) -> Result<Self> {
+        check_header(path)?;
         let name = path_string(path)?;
         let mut error = raw::FluxionError::default();
         // SAFETY: all pointers are valid for the call.
@@ -202,15 +222,18 @@ impl CachedTexture {
         if texture.is_null() {
             return Err(Error::io(path, message(&error)));
         }
-        Ok(Self { system: Arc::clone(system), texture })
+        Ok(Self { system: Arc::clone(system), texture, path: path.to_path_buf() })
     }
 
-    /// The first samples of a pixel by its place in the file; zero where the file can no longer be read.
+    /// The first samples of a pixel by its place in the file; zero where the file can no longer be read, which
+    /// [`failed_lookups`] counts.
     pub fn texel(&self, x: i32, y: i32, samples: &mut [f32]) {
         let count = samples.len() as i32;
         // SAFETY: the system is alive, the texture is one of its own, and `samples` has room for `count` floats.
         if !unsafe { raw::fluxion_texture_texel(self.system.0, self.texture, x, y, count, samples.as_mut_ptr()) } {
             samples.fill(0.0);
+            let mut failed = FAILED.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+            failed.get_or_insert_with(|| (self.path.clone(), 0)).1 += 1;
         }
     }
 }

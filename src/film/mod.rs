@@ -147,6 +147,11 @@ impl Tile {
         self.counts[index]
     }
 
+    /// Samples of all pixels.
+    pub fn samples(&self) -> u64 {
+        self.counts.iter().map(|&count| u64::from(count)).sum()
+    }
+
     /// Adds a sample to pixel `index`. One that is not finite is counted as zero, and reported.
     pub fn add(&mut self, index: usize, sample: &Sample) -> Result<(), Rejected> {
         let (sample, outcome) = match sample.check() {
@@ -256,7 +261,7 @@ impl Film {
 
     /// Samples of all pixels.
     pub fn samples(&self) -> u64 {
-        self.tiles.iter().flat_map(|tile| &tile.counts).map(|&count| u64::from(count)).sum()
+        self.tiles.iter().map(Tile::samples).sum()
     }
 
     /// Samples of every pixel, row by row.

@@ -5,7 +5,7 @@ use std::path::Path;
 use super::Image;
 use crate::error::{Error, Result};
 use crate::ffi::oiio;
-pub use crate::ffi::oiio::{CachedTexture, ImageFile, Kind, Pixels, TextureSystem, read};
+pub use crate::ffi::oiio::{CachedTexture, ImageFile, Kind, Pixels, TextureSystem, failed_lookups, read};
 use crate::files;
 use crate::math::srgb_encode;
 

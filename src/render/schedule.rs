@@ -159,14 +159,17 @@ fn run_tiles(scene: &Scene, settings: Settings, control: &Control, outcome: &mut
         if control.stop.load(Ordering::Relaxed) || due.load(Ordering::Relaxed) {
             return;
         }
+        let before = tile.samples();
         if let Some(rejected) = run_tile(settings, wave, tile, goals) {
             let mut first = first_rejected.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
             first.get_or_insert(rejected);
         }
+        let worked = tile.samples() > before;
         let mut done = done.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
         *done += 1;
         (control.progress)(*done as f32 / total as f32);
-        if control.keeper.is_some_and(|keeper| keeper.due()) {
+        // A tile that was at its goal already is no reason for another pause.
+        if worked && control.keeper.is_some_and(|keeper| keeper.due()) {
             due.store(true, Ordering::Relaxed);
         }
     });

@@ -5,6 +5,7 @@ use std::time::Instant;
 use anyhow::Result;
 use fluxion::adaptive::{self, Begun, Limits};
 use fluxion::film::{Frame, Needs, exr};
+use fluxion::image::io::failed_lookups;
 use fluxion::plan::Plan;
 use fluxion::reconstruct::{Reconstruction, Solution};
 use fluxion::render::{self, Budget, Control, Outcome, SampleId, Settings};
@@ -24,16 +25,25 @@ pub struct Job<'a> {
     pub keeper: Option<&'a Keeper<'a>>,
 }
 
+/// What a job leaves to be written.
+struct Made {
+    frame: Frame,
+    solution: Solution,
+    /// How saving the layers went: without them there is still an image.
+    layers: Result<()>,
+}
+
 impl Job<'_> {
     /// Renders, reconstructs and writes.
     pub fn run(&self, begun: Begun, stats: &mut Stats) -> Result<()> {
         let args = self.args;
-        let (frame, solution) = if args.adaptive.is_some() || args.target_error.is_some() {
+        let Made { frame, solution, layers } = if args.adaptive.is_some() || args.target_error.is_some() {
             self.adaptive(begun, stats)?
         } else {
             self.straight(begun, stats)?
         };
         method::write(&args.output, &solution, &frame, stats)?;
+        layers?;
         if let Some(path) = &args.json {
             stats.save(path)?;
         }
@@ -57,7 +67,7 @@ impl Job<'_> {
     }
 
     /// As many samples for every pixel.
-    fn straight(&self, begun: Begun, stats: &mut Stats) -> Result<(Frame, Solution)> {
+    fn straight(&self, begun: Begun, stats: &mut Stats) -> Result<Made> {
         let args = self.args;
         let budget = match args.time {
             Some(time) => Budget::Time(time),
@@ -74,13 +84,13 @@ impl Job<'_> {
         }
         frame.attributes = self.attributes(stats);
         stats.seconds.develop = start.elapsed().as_secs_f64();
-        self.save_layers(&frame, stats)?;
+        let layers = self.save_layers(&frame, stats);
         let solution = args.method.solve(self.method, &frame, args.quiet, stats)?;
-        Ok((frame, solution))
+        Ok(Made { frame, solution, layers })
     }
 
     /// In passes, samples where they are needed.
-    fn adaptive(&self, begun: Begun, stats: &mut Stats) -> Result<(Frame, Solution)> {
+    fn adaptive(&self, begun: Begun, stats: &mut Stats) -> Result<Made> {
         let args = self.args;
         let limits = Limits {
             // Without any limit the scene says how much.
@@ -104,12 +114,12 @@ impl Job<'_> {
         stats.rendered(&render);
         (stats.seconds.develop, stats.seconds.reconstruct, stats.passes) = (develop, reconstruct, passes);
         frame.attributes = self.attributes(stats);
-        self.save_layers(&frame, stats)?;
+        let layers = self.save_layers(&frame, stats);
         args.method.write_notes(&solution, &frame)?;
         if let (false, Some(error)) = (args.quiet, stats.passes.last().and_then(|pass| pass.error)) {
             eprintln!("estimated relMSE {error:.2e} after {} passes", stats.passes.len());
         }
-        Ok((frame, solution))
+        Ok(Made { frame, solution, layers })
     }
 
     /// Saves the layers, if they are asked for.
@@ -124,6 +134,12 @@ impl Job<'_> {
 
     fn warn(&self, outcome: &Outcome) {
         let args = self.args;
+        if let Some((path, count)) = failed_lookups() {
+            let path = path.display();
+            eprintln!(
+                "warning: {count} lookups in textures that can no longer be read were black, the first in {path}"
+            );
+        }
         if outcome.stopped {
             let spp = outcome.film.most_samples();
             eprintln!("warning: stopped early; the image has up to {spp} samples per pixel");

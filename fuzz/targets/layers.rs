@@ -1,0 +1,14 @@
+//! Any bytes as an EXR file of layers.
+#![no_main]
+
+use fluxion::film::exr;
+use libfuzzer_sys::fuzz_target;
+
+fuzz_target!(|bytes: &[u8]| {
+    let folder = tempfile::tempdir().expect("a folder for the file");
+    let path = folder.path().join("layers.exr");
+    std::fs::write(&path, bytes).expect("room for the file");
+    if let Ok(frame) = exr::load(&path) {
+        assert!(frame.present().all(|(_, image)| image.width == frame.width && image.height == frame.height));
+    }
+});
