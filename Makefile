@@ -6,7 +6,7 @@ PACKAGES = g++ pkg-config libclang-dev libembree-dev libopenimageio-dev
 TEST_PACKAGES = chromium
 SCENE = scenes/cornell-box/scene.xml
 
-.PHONY: demo test packages check
+.PHONY: demo test packages check licences memcheck
 
 demo: packages
 	cargo build --release
@@ -20,12 +20,25 @@ test: packages
 	cargo test --release
 	cargo build --release
 	target/release/fluxion validate
+	target/release/fluxion stress
 
 # Format, lints and documentation, as CI checks them.
 check: packages
 	cargo fmt --check
 	cargo clippy --release --all-targets -- -D warnings
 	RUSTDOCFLAGS="-D warnings" cargo doc --no-deps
+
+# Licences and sources of all dependencies. Advisories are not looked at here, since that takes an internet connection:
+# `cargo deny check advisories` or `cargo audit` does.
+licences:
+	@command -v cargo-deny > /dev/null || cargo install cargo-deny --locked
+	cargo deny check licenses bans sources
+
+# Small renders under valgrind.
+memcheck: packages
+	@sh .ci/packages valgrind
+	cargo build --release
+	tools/memcheck/run
 
 # Installs what is missing, through sudo when not root. Elsewhere than on Debian it says what is needed.
 packages:

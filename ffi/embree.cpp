@@ -254,6 +254,8 @@ void fluxion_intersect_packet(void *scene, const FluxionRays *rays, bool coheren
   RTCRayHit16 query;
   alignas(64) int valid[FLUXION_PACKET];
   to_rtc(rays, &query.ray, valid);
+  /* What rays that meet nothing leave there is copied, too. */
+  std::memset(&query.hit, 0, sizeof query.hit);
   for (int i = 0; i < FLUXION_PACKET; ++i) {
     query.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
     query.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;

@@ -34,7 +34,7 @@ pub struct Args {
 #[derive(Subcommand)]
 enum Command {
     /// Render a scene and reconstruct its image
-    Render(render::Args),
+    Render(Box<render::Args>),
     /// Reconstruct an image from saved layers
     Reconstruct(reconstruct::Args),
     /// Measure images against a reference

@@ -81,18 +81,21 @@ pub fn exact(image: &Image) -> Frame {
     frame
 }
 
+/// What is sampled: the layer of the mean, that of its variance, and those of the bins.
+pub const KINDS: [Kind; 3] = [
+    (Layer::Color, Layer::ColorVariance, Layer::BinColor),
+    (Layer::Dx, Layer::DxVariance, Layer::BinDx),
+    (Layer::Dy, Layer::DyVariance, Layer::BinDy),
+];
+type Kind = (Layer, Layer, fn(u8) -> Layer);
+
 /// The same with noise of [`COLOR`] and [`EDGE`] times `noise`, even between two bounds, and its variances.
 pub fn noisy(image: &Image, noise: f32, seed: u64) -> Frame {
     let mut frame = exact(image);
     // An even distribution of this width has variance one.
     let width = 12f32.sqrt();
-    let kinds: [(Layer, Layer, fn(u8) -> Layer, f32); 3] = [
-        (Layer::Color, Layer::ColorVariance, Layer::BinColor, COLOR),
-        (Layer::Dx, Layer::DxVariance, Layer::BinDx, EDGE),
-        (Layer::Dy, Layer::DyVariance, Layer::BinDy, EDGE),
-    ];
-    for (kind, (whole, variance, bin, deviation)) in kinds.into_iter().enumerate() {
-        let deviation = deviation * noise;
+    for (kind, (whole, variance, bin)) in KINDS.into_iter().enumerate() {
+        let deviation = if whole == Layer::Color { COLOR } else { EDGE } * noise;
         let of_bin = deviation * (BINS as f32).sqrt();
         change(&mut frame, whole, |_, _| 0.0);
         for k in 0..BINS as u8 {

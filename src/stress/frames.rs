@@ -1,7 +1,7 @@
 //! Frames that no method likes.
 
 use super::frame::{
-    COLOR, SIZE, change, exact, expose, farthest, flat, methods, mse, noisy, not_finite, picture, random, run,
+    COLOR, KINDS, SIZE, change, exact, expose, farthest, flat, methods, mse, noisy, not_finite, picture, random, run,
 };
 use super::{Case, Checks};
 use crate::error::Result;
@@ -239,7 +239,8 @@ fn features(checks: &mut Checks) -> Result<()> {
     let frame = noisy(&truth, 1.0, 8);
     let before = frame.require(Layer::Color)?.clone();
     let lies = |i: usize| f32::from(u8::from((i / 3 % SIZE.0 / 4 + i / 3 / SIZE.0 / 4).is_multiple_of(2)));
-    let kinds: [(&str, &dyn Fn(&mut Frame)); 4] = [
+    type Make<'a> = &'a dyn Fn(&mut Frame);
+    let kinds: [(&str, Make); 4] = [
         ("constant", &|_| {}),
         ("saturated", &|frame| {
             [Layer::Albedo, Layer::Normal].into_iter().for_each(|layer| change(frame, layer, |_, _| 1.0));
@@ -277,12 +278,7 @@ fn few(checks: &mut Checks) -> Result<()> {
             let bins = [Layer::BinColor(k), Layer::BinDx(k), Layer::BinDy(k)];
             bins.into_iter().for_each(|layer| change(&mut frame, layer, |_, _| 0.0));
         }
-        let kinds: [(Layer, Layer, fn(u8) -> Layer); 3] = [
-            (Layer::Color, Layer::ColorVariance, Layer::BinColor),
-            (Layer::Dx, Layer::DxVariance, Layer::BinDx),
-            (Layer::Dy, Layer::DyVariance, Layer::BinDy),
-        ];
-        for (whole, variance, bin) in kinds {
+        for (whole, variance, bin) in KINDS {
             let bins: Vec<Vec<f32>> =
                 (0..spp as u8).map(|k| frame.require(bin(k)).map(|image| image.data.clone())).collect::<Result<_>>()?;
             let mean = |i: usize| bins.iter().map(|bin| bin[i]).sum::<f32>() / spp as f32;

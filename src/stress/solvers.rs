@@ -107,12 +107,14 @@ fn reweighted(checks: &mut Checks) -> Result<()> {
 
 fn combination(checks: &mut Checks) -> Result<()> {
     let (n, rank) = (60, 9);
-    let costs: [(&str, &dyn Fn(usize) -> f64); 3] = [
+    type Cost<'a> = &'a dyn Fn(usize) -> f64;
+    type Row<'a> = &'a dyn Fn(usize, usize) -> f64;
+    let costs: [(&str, Cost); 3] = [
         ("some cost", &|q| f64::from(random(7, q))),
         ("no cost", &|_| 0.0),
         ("costs of 1e-12 to 1e12", &|q| 10f64.powf(24.0 * f64::from(random(8, q)) - 12.0)),
     ];
-    let rows: [(&str, &dyn Fn(usize, usize) -> f64); 4] = [
+    let rows: [(&str, Row); 4] = [
         ("rows around zero", &|q, k| f64::from(random(9, q * 31 + k)) - 0.4),
         ("equal rows", &|_, k| f64::from(random(9, k)) - 0.4),
         ("rows of one direction", &|q, k| (f64::from(random(10, q)) + 0.2) * (k as f64 - 3.0)),

@@ -29,7 +29,8 @@ fn samples(checks: &mut Checks) -> Result<()> {
         ("1e15", 1e15),
         ("1e-42", 1e-42),
     ] {
-        let fields: [(&str, fn(&mut Sample, f32)); 4] = [
+        type Set = fn(&mut Sample, f32);
+        let fields: [(&str, Set); 4] = [
             ("color", |sample, bad| sample.color.y = bad),
             ("direct", |sample, bad| sample.direct.y = bad),
             ("depth", |sample, bad| sample.features.depth = bad),
