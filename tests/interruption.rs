@@ -307,6 +307,47 @@ fn what_cannot_be_written_is_an_error_that_says_what_is_kept() {
     assert!(refused(&mut render(&["-o", "d.exr", "--json", "full.json"])).contains("full.json: No space left"));
 }
 
+/// Starts a render, sends it a signal after a while, and returns its exit code, if it has one.
+fn signalled(folder: &Path, signal: &str, milliseconds: u64, extra: &[&str]) -> Option<i32> {
+    let mut child = std::process::Command::new(assert_cmd::cargo::cargo_bin("fluxion"))
+        .current_dir(folder)
+        .args(["render", &common::root().join("scenes/cornell-box/scene.xml").display().to_string(), "-q"])
+        .args(["--size", "64x64", "--checkpoint", "a.ckpt", "--checkpoint-every", "0.02s"])
+        .args(extra)
+        .spawn()
+        .unwrap();
+    std::thread::sleep(std::time::Duration::from_millis(milliseconds));
+    std::process::Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap();
+    child.wait().unwrap().code()
+}
+
+#[test]
+fn signals_end_a_render_with_an_image_and_a_checkpoint() {
+    for signal in ["-INT", "-TERM", "-HUP"] {
+        let folder = tempfile::tempdir().unwrap();
+        let code = signalled(folder.path(), signal, 1000, &["-o", "a.exr", "--time", "60s"]);
+        assert_eq!(code, Some(0), "{signal}");
+        let kept = checkpoint::load(&folder.path().join("a.ckpt")).unwrap();
+        assert!(kept.outcome.film.samples() > 0 && folder.path().join("a.exr").exists(), "{signal}");
+    }
+}
+
+#[test]
+fn a_killed_program_goes_on_where_it_was() {
+    let folder = tempfile::tempdir().unwrap();
+    let arguments = ["-o", "a.exr", "--spp", "200", "--resume"];
+    for milliseconds in [150, 400, 700] {
+        signalled(folder.path(), "-KILL", milliseconds, &arguments);
+    }
+    // Never: this one ends by itself.
+    let code = signalled(folder.path(), "-0", 0, &arguments);
+    assert_eq!(code, Some(0));
+    let scene = bundled("cornell-box", (64, 64));
+    let needs = Needs { features: true, edges: true, ..Needs::default() };
+    let kept = checkpoint::load(&folder.path().join("a.ckpt")).unwrap().outcome.film;
+    assert!(kept == film(&scene, 200, 0, needs));
+}
+
 #[test]
 fn out_of_memory_is_an_error() {
     let folder = tempfile::tempdir().unwrap();

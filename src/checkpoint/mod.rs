@@ -38,8 +38,9 @@ impl Checkpoint {
         frame
     }
 
-    /// Adds the samples of others, which must be of the same scene and other samples than those here. The result does
-    /// not depend on the order in which they are given, if the first one is the one whose first run has the least seed.
+    /// Adds the samples of another, as if they had been taken after those here. Why not, if they are of another scene or
+    /// some of them are here already. Sums in single precision depend on their order: sorted by their runs, films have the
+    /// same sum whatever order they come in.
     pub fn merge(&mut self, other: Self) -> Result<(), String> {
         self.origin.adds_to(&other.origin)?;
         self.outcome.film.merge(&other.outcome.film);
