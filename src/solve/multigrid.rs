@@ -11,8 +11,8 @@ use super::graph::{ALONE, CHUNK, Graph, MEMBERS, Quad};
 /// Graphs of fewer nodes are solved directly.
 const DIRECT: usize = 64;
 
-/// Least ratio of a level's nodes to those of the next for which that is worth two steps.
-const SHRINKS: usize = 3;
+/// Most nodes that may be visited on a level, of those of the finest, for two steps there.
+const WORK: u64 = 4;
 
 /// Damping of Jacobi smoothing: below one, so that it is a contraction in the energy norm.
 const DAMPING: f32 = 0.7;
@@ -184,9 +184,10 @@ impl Multigrid {
             self.direct(&coarse)
         } else {
             let mut correction = vec![[0.0; 4]; coarse.len()];
-            // Two steps on every level are twice the work of the level above unless it shrinks: without this bound, levels
-            // that hardly do would take time that doubles from one to the next.
-            let steps = if coarse.len() * SHRINKS <= b.len() { 2 } else { 1 };
+            // Two steps on every level visit the next one twice as often: where levels hardly shrink, all of them together
+            // would take time that doubles from one to the next.
+            let work = (coarse.len() as u64) << (at + 1).min(32);
+            let steps = if work <= WORK * self.graph(0).len() as u64 { 2 } else { 1 };
             self.descend(at + 1, &mut coarse, &mut correction, (steps, 0.25), deeper);
             correction
         };
