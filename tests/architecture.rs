@@ -22,7 +22,22 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("reference", &["scene", "film", "render", "image", "math"]),
     ("validate", &["scene", "reference", "image"]),
     ("stress", &["scene", "render", "film", "image", "reconstruct", "solve", "math", "files"]),
-    ("bench", &["scene", "plan", "film", "render", "image", "math", "reconstruct", "adaptive", "reference", "metrics"]),
+    (
+        "bench",
+        &[
+            "scene",
+            "plan",
+            "film",
+            "render",
+            "image",
+            "math",
+            "reconstruct",
+            "adaptive",
+            "reference",
+            "metrics",
+            "files",
+        ],
+    ),
     ("report", &["bench", "stress", "image", "math", "metrics"]),
 ];
 

@@ -6,6 +6,7 @@ use super::case::Case;
 use super::cell::{Budget, Ran};
 use super::record::{LeftOut, Record, Results, machine};
 use crate::error::{Error, Result};
+use crate::files;
 use crate::image::{Image, io};
 use crate::reference::fingerprint;
 
@@ -102,8 +103,6 @@ impl Store {
 
     /// Puts a file into the folder, in the place of an older one at once.
     pub fn write(&self, name: &str, text: &str) -> Result<()> {
-        let (part, file) = (self.folder.join(format!("{name}.part")), self.folder.join(name));
-        let written = std::fs::write(&part, text).and_then(|()| std::fs::rename(&part, &file));
-        written.map_err(|error| Error::io(&file, error))
+        files::write(&self.folder.join(name), text)
     }
 }

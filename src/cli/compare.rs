@@ -5,6 +5,7 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
 use fluxion::error::Error;
+use fluxion::files;
 use fluxion::image::{Image, io};
 use fluxion::metrics::{self, METRICS};
 use fluxion::report::{Page, Shown, View, heat};
@@ -70,19 +71,15 @@ pub fn run(args: &Args) -> Result<ExitCode> {
                 all => serde_json::to_string_pretty(all)?,
             };
             match file {
-                Some(path) => save(path, &(text + "\n"))?,
+                Some(path) => files::write(path, &(text + "\n"))?,
                 None => println!("{text}"),
             }
         }
     }
     if let Some(path) = &args.html {
-        save(path, &page(paths, images, reference)?)?;
+        files::write(path, &page(paths, images, reference)?)?;
     }
     Ok(ExitCode::SUCCESS)
-}
-
-fn save(path: &Path, text: &str) -> Result<()> {
-    std::fs::write(path, text).with_context(|| format!("cannot write {}", path.display()))
 }
 
 fn print(object: &serde_json::Map<String, serde_json::Value>, path: &Path) {

@@ -129,10 +129,20 @@ pub fn expose(frame: &mut Frame, factor: f32) {
     }
 }
 
+/// Whether a message names a layer.
+pub fn names(text: &str, layer: Layer) -> bool {
+    layer.channel_names().iter().any(|name| text.contains(name))
+}
+
 /// Values of a solution that are not finite.
 pub fn not_finite(solution: &Solution) -> f64 {
     let values = solution.image.data.iter().chain(solution.error.iter().flat_map(|error| &error.data));
     values.filter(|value| !value.is_finite()).count() as f64
+}
+
+/// Mean of all values.
+pub fn average(image: &Image) -> f64 {
+    image.data.iter().map(|&value| f64::from(value)).sum::<f64>() / image.data.len() as f64
 }
 
 /// Mean squared difference of two pictures.

@@ -1,7 +1,8 @@
 //! Frames that no method likes.
 
 use super::frame::{
-    COLOR, KINDS, SIZE, change, exact, expose, farthest, flat, methods, mse, noisy, not_finite, picture, random, run,
+    COLOR, KINDS, SIZE, average, change, exact, expose, farthest, flat, methods, mse, names, noisy, not_finite,
+    picture, random, run,
 };
 use super::{Case, Checks};
 use crate::error::Result;
@@ -74,8 +75,7 @@ fn firefly(checks: &mut Checks) -> Result<()> {
     change(&mut frame, Layer::Color, |i, value| if i / 3 == at / 3 { 1e8 } else { value });
     change(&mut frame, Layer::ColorVariance, |i, value| if i / 3 == at / 3 { 1e16 } else { value });
     change(&mut frame, Layer::BinColor(2), |i, value| if i / 3 == at / 3 { 8e8 } else { value });
-    let mean = |image: &Image| image.data.iter().map(|&value| f64::from(value)).sum::<f64>();
-    let color = frame.get(Layer::Color).map(mean).unwrap_or_default();
+    let color = average(frame.require(Layer::Color)?);
     for method in methods() {
         let solution = run(method, &frame)?;
         checks.add(method.id, FINITE, not_finite(&solution), 0.0);
@@ -85,7 +85,7 @@ fn firefly(checks: &mut Checks) -> Result<()> {
         let apart = far.map(|(_, &value)| f64::from((value - 1.0).abs())).fold(0.0, f64::max);
         match method.id {
             "l2" => {
-                let kept = (mean(&solution.image) / color - 1.0).abs();
+                let kept = (average(&solution.image) / color - 1.0).abs();
                 checks.add(method.id, "change of the mean", kept, 1e-4);
             }
             id if is_robust(id) => {
@@ -153,8 +153,7 @@ fn wild_edges(checks: &mut Checks) -> Result<()> {
             // These believe differences whatever their variances.
             "l1" | "least_trimmed" | "control_variate" => {}
             "l2" => {
-                let mean = |image: &Image| image.data.iter().map(|&value| f64::from(value)).sum::<f64>();
-                let kept = (mean(&solution.image) - mean(&before)).abs() / (1e6 * before.data.len() as f64);
+                let kept = (average(&solution.image) - average(&before)).abs() / 1e6;
                 checks.add(method.id, "change of the mean, of the differences", kept, 1e-6);
             }
             _ => checks.add(method.id, GAIN, mse(&solution.image, &truth) / mse(&before, &truth), 1.0),
@@ -203,7 +202,7 @@ fn not_numbers(checks: &mut Checks) -> Result<()> {
                 change(&mut frame, layer, |i, value| if i == 5 { poison } else { value });
                 let named = run(method, &frame).err().is_some_and(|error| {
                     let text = error.to_string();
-                    layer.channel_names().iter().any(|name| text.contains(name)) && text.contains("pixel")
+                    names(&text, layer) && text.contains("pixel")
                 });
                 silent += u32::from(!named);
             }
@@ -223,10 +222,7 @@ fn negative(checks: &mut Checks) -> Result<()> {
             // An error is an answer, too, if it says which layer is not what it should be.
             match run(method, &frame) {
                 Ok(solution) => bad += not_finite(&solution),
-                Err(error) => {
-                    let text = error.to_string();
-                    bad += f64::from(u8::from(!layer.channel_names().iter().any(|name| text.contains(name))));
-                }
+                Err(error) => bad += f64::from(u8::from(!names(&error.to_string(), layer))),
             }
         }
         checks.add(method.id, "values not finite, all layers in turn", bad, 0.0);

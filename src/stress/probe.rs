@@ -3,10 +3,9 @@
 use std::sync::atomic::AtomicBool;
 
 use super::Checks;
-use super::frame::{QUIET, not_finite};
+use super::frame::{QUIET, average, not_finite};
 use crate::error::Result;
 use crate::film::{Film, Frame, Layer, Needs};
-use crate::image::Image;
 use crate::reconstruct::{parse, solve};
 use crate::render::gradient::shift::{SHIFTS, Shift};
 use crate::render::{Budget, Control, Settings, render};
@@ -22,7 +21,6 @@ const RUNS: u64 = 6;
 pub struct Probe {
     scene: Scene,
     spp: u32,
-    seed: u64,
 }
 
 /// A perspective camera.
@@ -77,11 +75,11 @@ impl Probe {
             {}</scene>"#,
             elements.join("\n")
         );
-        Ok(Self { scene: load::load_text(&text, &load::Options::default())?, spp, seed: 0 })
+        Ok(Self { scene: load::load_text(&text, &load::Options::default())?, spp })
     }
 
     fn film(&self, run: u64, needs: Needs, shift: Shift) -> Film {
-        let settings = Settings { budget: Budget::Spp(self.spp), seed: self.seed + run, first: 0, needs, shift };
+        let settings = Settings { budget: Budget::Spp(self.spp), seed: run, first: 0, needs, shift };
         let control = Control { stop: &AtomicBool::new(false), progress: &|_| {}, keeper: None };
         render(&self.scene, settings, &control).film
     }
@@ -118,10 +116,6 @@ impl Probe {
         }
         Ok(())
     }
-}
-
-fn average(image: &Image) -> f64 {
-    image.data.iter().map(|&value| f64::from(value)).sum::<f64>() / image.data.len() as f64
 }
 
 /// Mean of a frame, with directly seen emitters.
