@@ -1,34 +1,18 @@
 //! Seconds of each stage of a reconstruction: `cargo bench --bench reconstruct -- [METHOD [LAYERS.exr [WxH ...]]]`.
 //!
-//! The layers are those of `fluxion render --layers`; without a file a frame is made up. Sizes other than the frame's
+//! The layers are those of `fluxion render --layers`; without a file they are synthetic. Sizes other than the frame's
 //! repeat it or cut it off. Medians of five runs.
 
 use std::cell::RefCell;
 use std::path::Path;
 use std::time::Instant;
 
-use fluxion::film::{Frame, Layer, exr};
+use fluxion::film::{Frame, exr};
 use fluxion::image::Image;
-use fluxion::math::rng;
 use fluxion::reconstruct::{Context, parse, solve};
+use fluxion::synthetic::{Distribution, Noise, noisy, picture};
 
 const RUNS: usize = 5;
-
-const LAYERS: [Layer; 13] = [
-    Layer::Color,
-    Layer::ColorVariance,
-    Layer::Dx,
-    Layer::DxVariance,
-    Layer::Dy,
-    Layer::DyVariance,
-    Layer::Albedo,
-    Layer::AlbedoVariance,
-    Layer::Normal,
-    Layer::NormalVariance,
-    Layer::Depth,
-    Layer::DepthVariance,
-    Layer::Samples,
-];
 
 fn main() {
     // Cargo passes --bench of its own.
@@ -93,28 +77,8 @@ fn repeated(source: &Frame, width: usize, height: usize) -> Frame {
     frame
 }
 
-/// Blocks of colour under noise.
+/// A picture under noise.
 fn noise() -> Frame {
-    let (width, height) = (640, 360);
-    let mut frame = Frame::new(width, height);
-    for (k, layer) in LAYERS.into_iter().enumerate() {
-        let mut image = Image::new(width, height, layer.info().channels.len());
-        let channels = image.channels;
-        for (i, value) in image.data.iter_mut().enumerate() {
-            let (x, y) = (i / channels % width, i / channels / width);
-            let random = rng::unit(rng::combine(k as u64, i as u64)) - 0.5;
-            *value = match layer {
-                Layer::Color => 1.0 + ((x / 40 + y / 40) % 3) as f32 + random,
-                Layer::Albedo | Layer::Normal => 0.2 + 0.3 * ((x / 40 + y / 40) % 3) as f32,
-                Layer::Dx | Layer::Dy => 0.3 * random,
-                Layer::ColorVariance => 1.0 / 12.0,
-                Layer::DxVariance | Layer::DyVariance => 0.09 / 12.0,
-                Layer::Samples => 16.0,
-                Layer::Depth => 3.0,
-                _ => 0.0,
-            };
-        }
-        frame.set(layer, image);
-    }
-    frame
+    let noise = Noise { color: 0.3, edge: 0.09, distribution: Distribution::Uniform };
+    noisy(&picture((640, 360)), noise, 1)
 }

@@ -11,8 +11,7 @@ use std::time::{Duration, Instant};
 
 use fluxion::film::Needs;
 use fluxion::plan::Plan;
-use fluxion::render::gradient::shift::Shift;
-use fluxion::render::{Budget, Control, Settings, render};
+use fluxion::render::{Budget, Control, RenderSettings, render};
 use fluxion::scene::{Scene, load};
 
 const ROUNDS: usize = 5;
@@ -75,10 +74,10 @@ fn measure(path: &Path, pools: &[rayon::ThreadPool; 2]) -> Figures {
     let scene = load_at(path, Some(size));
     let half = load_at(path, Some((size.0 / 2, size.1 / 2)));
     let mut general = load_at(path, Some(size));
-    general.generalize();
+    general.disable_fast_paths();
     let mut logged = load_at(path, Some((size.0 / 2, size.1 / 2)));
     let paths = Needs::default();
-    let gradients = Needs { edges: true, ..paths };
+    let gradients = Needs::EDGES;
     let planned = Plan::new(&scene, gradients, paths).needs;
     let on = |pool: usize, scene: &Scene, spp: u32, needs: Needs| pools[pool].install(|| seconds(scene, spp, needs));
 
@@ -125,8 +124,8 @@ fn load_at(path: &Path, size: Option<(usize, usize)>) -> Scene {
 }
 
 fn seconds(scene: &Scene, spp: u32, needs: Needs) -> f64 {
-    let settings = Settings { budget: Budget::Spp(spp), seed: 1, first: 0, needs, shift: Shift::default() };
-    let control = Control { stop: &AtomicBool::new(false), progress: &|_| (), keeper: None };
+    let settings = RenderSettings { seed: 1, ..RenderSettings::new(Budget::Spp(spp), needs) };
+    let control = Control { stop: &AtomicBool::new(false), progress: &|_| (), sink: None };
     let elapsed: Duration = render(scene, settings, &control).elapsed;
     elapsed.as_secs_f64()
 }

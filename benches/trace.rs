@@ -6,7 +6,7 @@ use divan::Bencher;
 use divan::counter::ItemsCount;
 use fluxion::film::TILE;
 use fluxion::math::lanes::{LANES, Lanes, Lanes3, Mask};
-use fluxion::render::gradient::shift::{SHIFTS, Shift};
+use fluxion::render::{SHIFTS, Shift};
 use fluxion::render::{SampleId, sample};
 use fluxion::scene::packet::{Rays, Surfaces};
 use fluxion::scene::{Scene, load};
@@ -78,7 +78,7 @@ fn visibility_packet(bencher: Bencher, name: &str) {
 #[divan::bench(args = SCENES, consts = [0, 1])]
 fn shifted_wave<const SHIFT: usize>(bencher: Bencher, name: &str) {
     let scene = bundled(name);
-    let (_, shift, _): (_, Shift, _) = SHIFTS[SHIFT];
+    let shift = Shift::named(SHIFTS[SHIFT].id).expect("a row of the table");
     let (x, y) = (scene.sensor().width / 2, scene.sensor().height / 2);
     let mut index = 0;
     bencher.counter(ItemsCount::new(TILE * TILE)).bench_local(|| {

@@ -4,19 +4,19 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// What every fallible function of the library returns.
+/// Result of every fallible function of the library.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
-/// A place in an input file, for messages: `scene.xml:12`.
+/// A location in an input file, for messages: `scene.xml:12`.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Place {
+pub struct SourceLoc {
     /// The file, as the user or the scene named it.
     pub file: Arc<Path>,
     /// Line number from 1; 0 when the whole file is meant.
     pub line: u32,
 }
 
-impl Place {
+impl SourceLoc {
     /// The whole of `file`.
     pub fn file(file: &Path) -> Self {
         Self { file: Arc::from(file), line: 0 }
@@ -27,41 +27,41 @@ impl Place {
         Self { file: Arc::from(file), line }
     }
 
-    /// The input here is malformed.
+    /// The error of malformed input at this location.
     pub fn invalid(&self, what: impl Into<String>) -> Error {
-        Error::Invalid { place: self.clone(), what: what.into() }
+        Error::Invalid { loc: self.clone(), what: what.into() }
     }
 
-    /// The input here asks for something Fluxion does not do.
+    /// The error of input at this location that asks for something Fluxion does not have.
     pub fn unsupported(&self, what: impl Into<String>) -> Error {
-        Error::Unsupported { place: self.clone(), what: what.into() }
+        Error::Unsupported { loc: self.clone(), what: what.into() }
     }
 }
 
-impl fmt::Display for Place {
+impl fmt::Display for SourceLoc {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}", self.file.display())?;
         if self.line > 0 { write!(f, ":{}", self.line) } else { Ok(()) }
     }
 }
 
-/// Why something could not be done.
+/// The reason why something could not be done. The program exits with 2 after [`Error::Usage`] and with 1 after all others.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// The input is well formed but asks for something that is not there; the text says what is supported.
-    #[error("{place}: {what}")]
+    /// The input is well formed but asks for something that Fluxion does not have.
+    #[error("{loc}: {what}")]
     Unsupported {
-        /// Where it is asked for.
-        place: Place,
-        /// What is asked for and what there is instead.
+        /// Location of the request.
+        loc: SourceLoc,
+        /// The request, and what is supported instead.
         what: String,
     },
     /// The input is malformed.
-    #[error("{place}: {what}")]
+    #[error("{loc}: {what}")]
     Invalid {
-        /// Where.
-        place: Place,
-        /// What is wrong and what was expected.
+        /// Location of the fault.
+        loc: SourceLoc,
+        /// The fault, and what was expected.
         what: String,
     },
     /// A frame lacks a layer that the method needs.
@@ -72,10 +72,16 @@ pub enum Error {
         /// How to get it.
         remedy: String,
     },
+    /// Values that make no sense where they stand, such as NaN in an image or a negative variance.
+    #[error("{0}")]
+    BadData(String),
+    /// Two inputs that do not belong together: images of different shapes, films of different scenes.
+    #[error("{0}")]
+    Mismatch(String),
     /// A parameter or option has a value that makes no sense.
     #[error("{0}")]
     Usage(String),
-    /// The system could not read or write a file.
+    /// The system could not read or write a file, or the file is not what it should be.
     #[error("{}: {what}", path.display())]
     Io {
         /// The file.
@@ -83,14 +89,34 @@ pub enum Error {
         /// The system's or the image library's reason.
         what: String,
     },
-    /// Embree refused to build or to run.
-    #[error("embree: {0}")]
-    Embree(String),
+    /// A library that Fluxion calls has failed.
+    #[error("{library}: {what}")]
+    Backend {
+        /// Name of the library.
+        library: &'static str,
+        /// The library's reason.
+        what: String,
+    },
 }
 
 impl Error {
-    /// Wraps a reason for failing on `path`.
+    /// The failure of an operation on the file `path`.
     pub fn io(path: &Path, what: impl fmt::Display) -> Self {
         Self::Io { path: path.to_path_buf(), what: what.to_string() }
+    }
+
+    /// The file `path` does not belong to the other inputs.
+    pub fn mismatch(path: &Path, what: impl fmt::Display) -> Self {
+        Self::Mismatch(format!("{}: {what}", path.display()))
+    }
+
+    /// The file `path` holds values that make no sense.
+    pub fn bad_data(path: &Path, what: impl fmt::Display) -> Self {
+        Self::BadData(format!("{}: {what}", path.display()))
+    }
+
+    /// The failure of a library that Fluxion calls.
+    pub fn backend(library: &'static str, what: impl fmt::Display) -> Self {
+        Self::Backend { library, what: what.to_string() }
     }
 }

@@ -6,10 +6,24 @@
 //!              +----------------- adaptive: allocate <----+------------+
 //! ```
 //!
-//! A **sample** is what one camera path leaves behind; samples are dealt to **bins**. An **edge** is the difference to
-//! a neighbouring pixel, estimated from both of its ends by **shifting** paths. The **film** keeps running moments of
-//! all of it; developed, it is a **frame** of **layers**: images with names and variances. A **method** reconstructs
-//! an image from a frame, and the **plan** says what need not be computed for it.
+//! A **sample** is the result of one camera path; sample i of a pixel belongs to **bin** i mod 8. An **edge** is the
+//! difference between two pixels, estimated from both of its ends by **shifting** paths. The **film** accumulates
+//! statistics of all samples; developed, it is a **frame** of **layers**: images with names and variances. A **method**
+//! reconstructs an image from a frame, and the **plan** says what need not be computed for it. docs/glossary.md has all
+//! terms.
+//!
+//! ```no_run
+//! use fluxion::{Budget, Context, Control, RenderSettings, load, parse_method, render, solve};
+//!
+//! # fn main() -> fluxion::Result<()> {
+//! let scene = load("scene.xml".as_ref(), &Default::default())?;
+//! let method = parse_method("frgr")?;
+//! let settings = RenderSettings::new(Budget::Spp(64), method.needs());
+//! let frame = render(&scene, settings, &Control::QUIET).film.develop();
+//! let image = solve(method.as_ref(), &frame, &Context::QUIET)?.image;
+//! # Ok(())
+//! # }
+//! ```
 
 pub mod error;
 pub mod files;
@@ -17,7 +31,6 @@ pub mod math;
 
 pub mod ffi;
 pub mod image;
-pub mod solve;
 
 pub mod scene;
 
@@ -26,6 +39,7 @@ pub mod plan;
 pub mod render;
 
 pub mod reconstruct;
+pub mod solve;
 
 pub mod adaptive;
 pub mod checkpoint;
@@ -35,6 +49,16 @@ pub mod reference;
 pub mod validate;
 
 pub mod stress;
+pub mod synthetic;
 
 pub mod bench;
 pub mod report;
+
+pub use self::error::{Error, Result};
+pub use self::film::{Frame, Layer, exr};
+pub use self::image::Image;
+pub use self::image::io::write_color;
+pub use self::reconstruct::{Context, Solution, parse as parse_method, solve};
+pub use self::render::{Budget, Control, RenderSettings, render};
+pub use self::scene::Scene;
+pub use self::scene::load::load;

@@ -1,41 +1,44 @@
-//! What a scene and a method need, and so what is left out: decided once, before rendering, with the reasons.
+//! The plan: what a scene and a method need, and so what is left out. Decided once, before rendering, with the reasons.
 
-use crate::film::Needs;
+use crate::film::{EdgeNeed, Needs};
 use crate::scene::Scene;
 
-/// Something that may be computed, and why it is or is not.
+/// A decision: something that may be computed, and the reason why it is or is not.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Item {
-    /// What.
-    pub what: &'static str,
+    /// Name of the thing, as in `gradients`.
+    pub name: &'static str,
     /// Whether it is computed.
     pub computed: bool,
-    /// Why.
+    /// The reason.
     pub reason: String,
 }
 
-/// What will be rendered.
+/// Everything that is decided before rendering.
 #[derive(Clone, Debug)]
 pub struct Plan {
-    /// What the film records.
+    /// Statistics that the film records.
     pub needs: Needs,
     /// All decisions.
     pub items: Vec<Item>,
-    dark: bool,
 }
 
 impl Plan {
-    /// Decides for a method's needs and what is to be saved besides.
+    /// Decides for the needs of a method and of the layers to be saved.
     pub fn new(scene: &Scene, method: Needs, saved: Needs) -> Self {
         let wanted = method.union(saved);
-        let dark = edges_differ(scene).is_err();
-        let needs = Needs { edges: wanted.edges && !dark, ..wanted };
+        let edges = match scatters_light(scene) {
+            // Known at no cost, whether or not the method asks.
+            Err(_) => EdgeNeed::KnownZero,
+            Ok(()) => wanted.edges,
+        };
+        let needs = Needs { edges, ..wanted };
         let mut items = of_film(scene, method, saved, needs);
         items.extend(of_scene(scene, needs));
-        Self { needs, items, dark }
+        Self { needs, items }
     }
 
-    /// Leaves nothing out, for comparison: the scene is to be [generalized](Scene::generalize) as well.
+    /// Leaves nothing out, for comparison; to be used with [`Scene::disable_fast_paths`].
     pub fn all(scene: &Scene) -> Self {
         let mut plan = Self::new(scene, Needs::ALL, Needs::default());
         for item in &mut plan.items {
@@ -44,20 +47,15 @@ impl Plan {
         Self { needs: Needs::ALL, ..plan }
     }
 
-    /// Whether there is no scattered light, so that differences are not rendered since they are known to be zero.
-    pub fn is_dark(&self) -> bool {
-        self.dark
-    }
-
     /// One line: `+gradients -features -bins`.
     pub fn summary(&self) -> String {
         let sign = |item: &Item| if item.computed { '+' } else { '-' };
-        self.items.iter().map(|item| format!("{}{}", sign(item), item.what)).collect::<Vec<_>>().join(" ")
+        self.items.iter().map(|item| format!("{}{}", sign(item), item.name)).collect::<Vec<_>>().join(" ")
     }
 }
 
-/// Whether neighbouring pixels can differ in light that is scattered; why not, else.
-fn edges_differ(scene: &Scene) -> Result<(), &'static str> {
+/// Whether any scattered light can reach the camera, or the reason why none can: then all differences are zero.
+fn scatters_light(scene: &Scene) -> Result<(), &'static str> {
     if scene.emitters().is_empty() {
         return Err("nothing in the scene emits light");
     }
@@ -67,18 +65,18 @@ fn edges_differ(scene: &Scene) -> Result<(), &'static str> {
     }
 }
 
-/// What the film records.
+/// Decisions about the film.
 fn of_film(scene: &Scene, method: Needs, saved: Needs, needs: Needs) -> Vec<Item> {
-    let item = |what, computed, by_method: bool, by_saving: bool| {
+    let item = |name, computed, by_method: bool, by_saving: bool| {
         let reason = match (by_method, by_saving) {
             (true, _) => "the method needs them",
             (_, true) => "they are to be saved",
             _ => "neither the method nor the saved layers need them",
         };
-        Item { what, computed, reason: reason.to_owned() }
+        Item { name, computed, reason: reason.to_owned() }
     };
-    let mut gradients = item("gradients", needs.edges, method.edges, saved.edges);
-    if let (true, Err(reason)) = (method.edges || saved.edges, edges_differ(scene)) {
+    let mut gradients = item("gradients", needs.edges.is_sampled(), method.edges.is_on(), saved.edges.is_on());
+    if let (true, Err(reason)) = (method.union(saved).edges.is_on(), scatters_light(scene)) {
         gradients.reason = reason.to_owned();
     }
     vec![
@@ -91,39 +89,44 @@ fn of_film(scene: &Scene, method: Needs, saved: Needs, needs: Needs) -> Vec<Item
     ]
 }
 
-/// What tracing the scene takes.
+/// Decisions about the tracing of paths.
 fn of_scene(scene: &Scene, needs: Needs) -> Vec<Item> {
-    let census = scene.census();
-    let item = |what, computed, reason: String| Item { what, computed, reason };
-    let of_shapes = |count: usize, what: &str| format!("{count} of {} shapes {what}", census.shapes);
-    let (others, lens) = (census.shapes - census.diffuse, scene.sensor().has_lens());
-    let half_vectors = match (needs.edges, others) {
+    let stats = scene.stats();
+    let item = |name, computed, reason: String| Item { name, computed, reason };
+    let of_shapes = |count: usize, what: &str| format!("{count} of {} shapes {what}", stats.shapes);
+    let (others, lens) = (stats.shapes - stats.diffuse, scene.sensor().has_lens());
+    let half_vectors = match (needs.edges.is_sampled(), others) {
         (false, _) => "without gradients no path is shifted".to_owned(),
         (_, 0) => "every material is diffuse: offsets always join their base paths".to_owned(),
         _ => of_shapes(others, "may have lobes that are no wider than a mirror's"),
     };
-    let camera_rays = match (needs.edges, lens) {
+    let camera_rays = match (needs.edges.is_sampled(), lens) {
         (false, _) => "without gradients there are no offsets",
         (_, true) => "pixels look from different points of the lens",
         _ => "through a pinhole offsets begin as their neighbours' own paths",
     };
     let hidden = scene.integrator().hide_emitters;
     vec![
-        item("materials", others > 0, of_shapes(others, "have a material to be asked ray by ray")),
-        item("textures", census.textured > 0, of_shapes(census.textured, "need texture coordinates")),
-        item("derivatives", census.bent > 0, of_shapes(census.bent, "have a material that bends normals")),
+        item("materials", others > 0, of_shapes(others, "have a material that is evaluated ray by ray")),
+        item("textures", stats.textured > 0, of_shapes(stats.textured, "need texture coordinates")),
+        item("derivatives", stats.perturbed > 0, of_shapes(stats.perturbed, "have a material that perturbs normals")),
         item(
             "emitters",
-            census.glowing < census.emitters,
-            format!("{} of {} emitters are meshes that glow evenly", census.glowing, census.emitters),
+            stats.uniform_meshes < stats.emitters,
+            format!("{} of {} emitters are meshes of uniform emission", stats.uniform_meshes, stats.emitters),
         ),
         item(
             "environment",
             scene.has_environment(),
-            if scene.has_environment() { "light comes from all around" } else { "nothing surrounds the scene" }.into(),
+            if scene.has_environment() {
+                "an environment emits light from all directions"
+            } else {
+                "there is no environment emitter"
+            }
+            .into(),
         ),
         item("direct", !hidden, if hidden { "emitters are hidden" } else { "the camera may see emitters" }.into()),
-        item("half-vectors", needs.edges && others > 0, half_vectors),
-        item("offset-rays", needs.edges && lens, camera_rays.to_owned()),
+        item("half-vectors", needs.edges.is_sampled() && others > 0, half_vectors),
+        item("offset-rays", needs.edges.is_sampled() && lens, camera_rays.to_owned()),
     ]
 }

@@ -2,15 +2,13 @@
 //! worked on again and again.
 
 use std::path::Path;
-use std::sync::atomic::AtomicBool;
 
 use crate::error::{Error, Result};
-use crate::film::{Film, Layer, Needs};
+use crate::film::{Film, Layer, Needs, Provenance};
 use crate::image::Image;
 use crate::image::io::{ImageFile, Kind, Pixels, read, write};
 use crate::math::rng;
-use crate::render::gradient::shift::Shift;
-use crate::render::{Budget, Control, Settings, render};
+use crate::render::{Budget, Control, RenderSettings, Shift, render};
 use crate::scene::Scene;
 
 /// Seed of references, far from those that people choose.
@@ -20,6 +18,9 @@ pub const SEED: u64 = 0x5eed_0000_0001;
 /// would be too small for half floats); and the first half less the second.
 const CHANNELS: [&str; 9] =
     ["R", "G", "B", "sigma.R", "sigma.G", "sigma.B", "difference.R", "difference.G", "difference.B"];
+
+/// Attribute of a reference's expected relMSE, by which files are known to be references.
+const FLOOR: &str = "floor";
 
 /// Largest half float.
 const HALF_MAX: f32 = 65504.0;
@@ -78,9 +79,10 @@ impl Reference {
         let (mut halves, mut seconds) = (Vec::new(), 0.0);
         for (k, seed) in [self.seed, rng::combine(self.seed, 1)].into_iter().enumerate() {
             let progress = |share: f32| (control.progress)(0.5 * (k as f32 + share));
-            let control = Control { stop: control.stop, progress: &progress, keeper: None };
+            let control = Control { stop: control.stop, progress: &progress, sink: None };
             let (budget, first, needs) = (Budget::Spp(spp), self.spp / 2, Needs::default());
-            let outcome = render(scene, Settings { budget, seed, first, needs, shift: Shift::default() }, &control);
+            let outcome =
+                render(scene, RenderSettings { budget, seed, first, needs, shift: Shift::default() }, &control);
             if outcome.stopped {
                 return Ok(false);
             }
@@ -127,16 +129,16 @@ impl Reference {
             data.extend(rgb(&self.variance).map(f32::sqrt));
             data.extend(rgb(&self.difference));
         }
-        let attribute = |name: &str, value: String| (format!("fluxion:{name}"), value);
-        let attributes = vec![
-            attribute("version", env!("CARGO_PKG_VERSION").into()),
-            attribute("method", "primal".into()),
-            attribute("fingerprint", self.fingerprint.clone()),
-            attribute("seed", self.seed.to_string()),
-            attribute("spp", self.spp.to_string()),
-            attribute("seconds", format!("{:.3}", self.seconds)),
-            attribute("floor", format!("{:.3e}", self.floor())),
-        ];
+        let provenance = Provenance {
+            method: "primal".into(),
+            fingerprint: self.fingerprint.clone(),
+            seed: self.seed.to_string(),
+            spp: self.spp.to_string(),
+            seconds: format!("{:.3}", self.seconds),
+            ..Provenance::new()
+        };
+        let mut attributes = provenance.attributes();
+        attributes.push((Provenance::name(FLOOR), format!("{:.3e}", self.floor())));
         let channels = CHANNELS.map(String::from).to_vec();
         let (width, height) = (self.image.width, self.image.height);
         let pixels = Pixels { width, height, channels, data, eight_bit: false, attributes };
@@ -145,22 +147,18 @@ impl Reference {
 
     /// Whether a file was written by [`Reference::save`].
     pub fn is_one(path: &Path) -> Result<bool> {
-        Ok(ImageFile::open(path)?.attribute("fluxion:floor").is_some())
+        Ok(ImageFile::open(path)?.attribute(&Provenance::name(FLOOR)).is_some())
     }
 
     /// Reads one that [`Reference::save`] wrote.
     pub fn load(path: &Path) -> Result<Self> {
-        const NAMES: [&str; 4] = ["fingerprint", "seed", "spp", "seconds"];
-        let keys = NAMES.map(|name| format!("fluxion:{name}"));
-        let pixels = read(path, &keys.each_ref().map(String::as_str))?;
-        let attribute = |name: &str| {
-            let found = pixels.attributes.iter().find(|(key, _)| key.strip_prefix("fluxion:") == Some(name));
-            found.map(|(_, value)| value.as_str()).filter(|value| !value.is_empty())
-        };
+        let pixels = read(path, &Provenance::NAMES)?;
+        let Provenance { fingerprint, seed, spp, seconds, .. } = Provenance::from_attributes(&pixels.attributes);
         let lacks = |name: &str| not_one(path, &format!("its header has no sensible `fluxion:{name}`"));
-        let spp = attribute("spp").and_then(|text| text.parse::<u32>().ok()).filter(|spp| *spp > 0 && spp % 2 == 0);
-        let seconds = attribute("seconds").and_then(|text| text.parse::<f64>().ok()).filter(|s| (0.0..1e9).contains(s));
-        let seed = attribute("seed").and_then(|text| text.parse().ok());
+        let spp = spp.parse::<u32>().ok().filter(|spp| *spp > 0 && spp % 2 == 0);
+        let seconds = seconds.parse::<f64>().ok().filter(|s| (0.0..1e9).contains(s));
+        let seed = seed.parse().ok();
+        let fingerprint = Some(fingerprint).filter(|text| !text.is_empty());
         let positions = CHANNELS.map(|name| pixels.channels.iter().position(|other| other == name));
         let Some(positions) = positions.into_iter().collect::<Option<Vec<_>>>() else {
             return Err(not_one(path, &format!("it lacks some of the channels {}", CHANNELS.join(", "))));
@@ -173,7 +171,7 @@ impl Reference {
         let [image, mut variance, difference] = [0, 3, 6].map(|first| channels(&positions[first..first + 3]));
         for (what, image) in [("value", &image), ("standard error", &variance), ("difference", &difference)] {
             if let Some((x, y, _)) = image.not_finite() {
-                return Err(Error::io(path, format!("the {what} at pixel {x},{y} is not finite")));
+                return Err(Error::bad_data(path, format!("the {what} at pixel {x},{y} is not finite")));
             }
         }
         variance.data.iter_mut().for_each(|sigma| *sigma *= *sigma);
@@ -184,7 +182,7 @@ impl Reference {
             spp: spp.ok_or_else(|| lacks("spp"))?,
             seed: seed.ok_or_else(|| lacks("seed"))?,
             seconds: seconds.ok_or_else(|| lacks("seconds"))?,
-            fingerprint: attribute("fingerprint").ok_or_else(|| lacks("fingerprint"))?.to_owned(),
+            fingerprint: fingerprint.ok_or_else(|| lacks("fingerprint"))?,
         })
     }
 }
@@ -206,7 +204,7 @@ pub fn check(known: &str, path: &Path, scene: &Scene) -> Result<()> {
             "is the reference of another scene or of an older version of it (fingerprint {known}, the scene has \
              {other}); `fluxion reference` makes one"
         );
-        return Err(Error::io(path, what));
+        return Err(Error::mismatch(path, what));
     }
     Ok(())
 }
@@ -220,9 +218,4 @@ pub fn image_and_variance(film: &Film) -> Result<(Image, Image)> {
         Ok::<_, Error>(image)
     };
     Ok((sum(Layer::Color, Layer::Direct)?, sum(Layer::ColorVariance, Layer::DirectVariance)?))
-}
-
-/// A control that neither stops nor reports.
-pub fn silently<T>(work: impl FnOnce(&Control) -> T) -> T {
-    work(&Control { stop: &AtomicBool::new(false), progress: &|_| {}, keeper: None })
 }

@@ -1,4 +1,4 @@
-//! From errors to needs, and from needs to numbers of samples.
+//! From estimated errors to needs, and from needs to sample counts.
 
 use crate::error::Result;
 use crate::film::{Frame, Layer};
@@ -6,17 +6,17 @@ use crate::image::Image;
 use crate::image::planes::Planes;
 use crate::math::rng;
 
-/// Radius of the pixels that needs are averaged over: errors of single pixels are estimated badly, and what a pixel's
-/// samples are good for are those around it, too.
+/// Radius of the squares that needs are averaged over: error estimates of single pixels are noisy, and a pixel's samples
+/// improve those around it, too.
 const RADIUS: usize = 3;
 
-/// Luminance below which errors count as they do there, over the image's mean: like relMSE's floor, at any exposure.
+/// Floor of the luminance that errors are relative to, over the image's mean: like that of relMSE, at any exposure.
 const DARK: f64 = 0.2;
 
-/// Share of the samples that all pixels get alike, whatever they seem to need.
+/// Share of the samples that are spread evenly, so that no pixel is starved by a bad estimate.
 const MINIMUM: f64 = 0.25;
 
-/// Most samples that a pixel gets over what it would get if all were alike.
+/// Largest number of samples that a pixel gets, over that of even samples.
 const MOST: f64 = 16.0;
 
 /// Standard deviations of single samples, relative to the image's brightness: an `error` that falls with the number of
@@ -35,12 +35,12 @@ pub fn need(frame: &Frame, image: &Image, error: &Image) -> Result<Vec<f32>> {
     Ok(needs.to_image(width, height, 1.0).data)
 }
 
-/// Deals `samples` to pixels that have `counts` so far, so that the totals come as near to being proportional to `need` as
-/// can be. The result's sum is `samples` exactly.
+/// Allocates `samples` to pixels that have `counts` so far, so that the totals are as nearly proportional to `need` as
+/// possible. The result's sum is `samples` exactly.
 pub fn allocate(need: &[f32], counts: &[u32], samples: u64) -> Vec<u32> {
     let even = samples as f64 / need.len() as f64;
     let (alike, most) = (MINIMUM * even, MOST * even);
-    // What each gets if the totals are `level` times the needs.
+    // The new samples of a pixel if the totals are `level` times the needs.
     let share = |level: f64, i: usize| (level * f64::from(need[i].max(0.0)) - f64::from(counts[i])).clamp(alike, most);
     let total = |level: f64| (0..need.len()).map(|i| share(level, i)).sum::<f64>();
     let (mut low, mut high) = (0.0, 1.0);
@@ -54,7 +54,7 @@ pub fn allocate(need: &[f32], counts: &[u32], samples: u64) -> Vec<u32> {
     round(|i| share(low, i), need.len(), samples)
 }
 
-/// Whole numbers near shares, with a given sum: what is left over by one pixel goes to the next ones, from a random start.
+/// Integers near shares, with a given sum: the remainder of a pixel is carried over to the next, from a random start.
 fn round(share: impl Fn(usize) -> f64, pixels: usize, samples: u64) -> Vec<u32> {
     let scale = samples as f64 / (0..pixels).map(&share).sum::<f64>().max(1e-300);
     let start = f64::from(rng::unit(rng::combine(samples, pixels as u64)));

@@ -1,31 +1,33 @@
-//! The error of the whole image. What methods estimate for pixels is right in its pattern rather than in its size; new
-//! samples, which the last image has not seen, tell what it is to be multiplied by.
+//! The error of the whole image. Methods estimate the pattern of the errors of pixels better than their scale; the scale is
+//! estimated from new samples, which are independent of the last image.
 
 use crate::film::{Frame, Layer};
 use crate::image::planes::Planes;
 use crate::reconstruct::Solution;
 use serde::{Deserialize, Serialize};
 
-/// Luminance squared below which relMSE counts errors as they are.
+/// Regularisation of relMSE, in squared luminance.
 const EPSILON: f64 = 0.01;
 
-/// How certain it is beforehand that estimates are right: as if so much had been seen.
+/// Weight of the prior that estimates are right, in the units of [`Estimate::expected`]: about two pixels' worth of
+/// evidence, so that estimates of few samples do not swing the scale.
 const PRIOR: f64 = 2.0;
 
-/// Squares of noise are not normally distributed: they tell less than they would.
-const TAILS: f64 = 0.1;
+/// Weight of squared residuals, whose distribution has heavier tails than that of squared normal variates, which would
+/// have weight one.
+const HEAVY_TAIL_WEIGHT: f64 = 0.1;
 
-/// What has been seen in all passes so far. Sums over pixels, errors relative to the image's brightness.
+/// Sums over the pixels of all passes so far; errors are relative to the image's brightness.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub struct Estimate {
     /// Weighted squares of expected errors.
     expected: f64,
-    /// Weighted products of expected errors and squared distances of the image from new samples, and with the variances
-    /// that these claim to have.
+    /// Weighted products of expected errors with the squared distances of the image from new samples, and with the sample
+    /// variances of these.
     found: f64,
     claimed: f64,
-    /// Squared distances of new samples from old ones, and the variances that both claim: samples that are spread well
-    /// vary less than independent ones. Of scattered light and of directly seen emitters.
+    /// Squared distances of new samples from old ones over their sample variances, of scattered light and of directly seen
+    /// emitters: stratified samples vary less than their sample variance says.
     spread: [Ratio; 2],
 }
 
@@ -42,7 +44,7 @@ impl Ratio {
         self.expected += expected;
     }
 
-    /// At most one: spreading does no harm.
+    /// At most one: stratification does not add variance.
     fn value(self) -> f64 {
         if self.expected > 0.0 { (self.found / self.expected).clamp(0.01, 1.0) } else { 1.0 }
     }
@@ -60,7 +62,7 @@ impl Moments {
         Some(Self { mean: value(mean)?, variance: value(variance)? })
     }
 
-    /// Those of the samples that came between `before`, which `n` samples made, and these, of `all` samples.
+    /// Moments of the samples added since `before`; there were `n` samples then and are `all` now.
     fn since(&self, before: &Self, n: f64, all: f64) -> Self {
         let new = all - n;
         let mean = (all * self.mean - n * before.mean) / new;
@@ -75,7 +77,7 @@ const COLOR: [Layer; 2] = [Layer::Color, Layer::ColorVariance];
 const DIRECT: [Layer; 2] = [Layer::Direct, Layer::DirectVariance];
 
 impl Estimate {
-    /// Compares an image with the samples that were added since.
+    /// Compares the image of a pass with the samples that were added since.
     pub fn learn(&mut self, before: &Frame, solution: &Solution, after: &Frame) {
         let (Some(error), Some(n), Some(all), Some(noise)) =
             (&solution.error, before.get(Layer::Samples), after.get(Layer::Samples), smooth_variance(before))
@@ -89,7 +91,7 @@ impl Estimate {
         let of = |at, frame| Some([Moments::of(frame, COLOR, at)?, Moments::of(frame, DIRECT, at)?]);
         let values = solution.image.data.len();
         let known = |at| of(at, before).map_or(0.0, |[color, direct]| expected(at, &color, &direct).1);
-        // Where noise is small beside the typical error, all pixels count alike.
+        // Where noise is small beside the typical error, all pixels have the same weight.
         let typical = (0..values).map(known).sum::<f64>() / values as f64;
         for (at, &noise) in noise.iter().enumerate() {
             let (n, all) = (f64::from(n.data[at / 3]), f64::from(all.data[at / 3]));
@@ -100,9 +102,9 @@ impl Estimate {
                 continue;
             }
             let (relative, expected) = expected(at, &color, &direct);
-            // Pixels count by how well they tell: one over the variance of what is found.
+            // Pixels are weighted by the inverse variance of their evidence.
             let spread = relative * f64::from(noise) * n / (all - n) + expected + typical;
-            let weight = TAILS / (2.0 * spread * spread).max(1e-30);
+            let weight = HEAVY_TAIL_WEIGHT / (2.0 * spread * spread).max(1e-30);
             let new = color_after.since(&color, n, all);
             let distance = f64::from(solution.image.data[at]) - direct.mean - new.mean;
             self.expected += weight * expected * expected;
@@ -116,7 +118,7 @@ impl Estimate {
         }
     }
 
-    /// What scattered light's estimated errors are to be multiplied by.
+    /// Factor of the estimated errors of scattered light.
     fn ratio(&self) -> f64 {
         let found = self.found - self.spread[0].value() * self.claimed;
         ((PRIOR + found) / (PRIOR + self.expected)).clamp(0.1, 10.0)
@@ -137,12 +139,12 @@ impl Estimate {
     }
 }
 
-/// The part of an error that is not of directly seen emitters.
+/// The part of an error that is not due to directly seen emitters.
 fn scattered(error: f64, direct: f64) -> f64 {
     (error - direct).max(0.0)
 }
 
-/// Variances of the colour, no less than those around.
+/// Variances of the colour, raised to the mean of those around.
 fn smooth_variance(frame: &Frame) -> Option<Vec<f32>> {
     let image = frame.get(Layer::ColorVariance)?;
     let (width, height) = (image.width, image.height);

@@ -1,22 +1,23 @@
-//! What an adaptive run has decided and learnt so far: all that it takes, besides the film, to go on with it.
+//! The state of an adaptive run: everything that is needed, besides the film, to resume it.
 
 use serde::{Deserialize, Serialize};
 
+use super::Pass;
+use super::budget::PASSES;
 use super::estimate::Estimate;
-use super::{PASSES, Pass};
 use crate::film::{Frame, Layer};
 use crate::image::Image;
 use crate::reconstruct::Solution;
 
-/// How far a run has come.
+/// Decisions of a run so far.
 #[derive(Debug, Default)]
 pub struct Journal {
-    /// What fits into a few lines.
+    /// Everything that is no image.
     pub notes: Notes,
-    /// Samples that every pixel is to have after the pass that is being rendered; empty between passes.
+    /// Sample count of every pixel after the current pass; empty between passes.
     pub goals: Vec<u32>,
-    /// What was known when the pass began, if there is something to be learnt from it.
-    pub before: Option<Seen>,
+    /// Image and samples before the current pass, if its samples can test the image's error estimate.
+    pub previous: Option<PreviousPass>,
 }
 
 /// The part of a [`Journal`] that is no image.
@@ -35,51 +36,51 @@ impl Default for Notes {
     }
 }
 
-/// Where in a run.
+/// Position in a run.
 pub(super) enum Stage {
     /// In the first pass or before it.
-    Fresh,
+    FirstPass,
     /// In a later pass, whose goals are written down.
-    Dealing,
+    InPass,
     /// After a pass.
-    Between,
+    BetweenPasses,
 }
 
-/// An image and the samples it was made of.
+/// The image after a pass, and the samples it was made from.
 #[derive(Debug)]
-pub struct Seen {
+pub struct PreviousPass {
     pub(super) frame: Frame,
     pub(super) solution: Solution,
 }
 
-/// Layers of an earlier frame that are asked for.
-const SEEN: [Layer; 5] = [Layer::Samples, Layer::Color, Layer::ColorVariance, Layer::Direct, Layer::DirectVariance];
+/// Layers that are kept of the frame.
+const LAYERS: [Layer; 5] = [Layer::Samples, Layer::Color, Layer::ColorVariance, Layer::Direct, Layer::DirectVariance];
 
-impl Seen {
-    /// None without an estimated error, which is all there is to learn about.
+impl PreviousPass {
+    /// None without an estimated error, which new samples are to test.
     pub(super) fn new(frame: Frame, solution: Option<Solution>) -> Option<Self> {
         let solution = solution.filter(|solution| solution.error.is_some())?;
         Some(Self { frame, solution })
     }
 
-    /// Its images, in an order that [`Seen::from_images`] knows.
+    /// Its images, in an order that [`PreviousPass::from_images`] knows.
     pub fn images(&self) -> Vec<&Image> {
-        let layers = SEEN.iter().filter_map(|&layer| self.frame.get(layer));
+        let layers = LAYERS.iter().filter_map(|&layer| self.frame.get(layer));
         layers.chain([&self.solution.image]).chain(&self.solution.error).collect()
     }
 
     /// Channels of the images.
     pub fn channels() -> impl Iterator<Item = usize> {
-        SEEN.iter().map(|layer| layer.info().channels.len()).chain([3, 3])
+        LAYERS.iter().map(|layer| layer.info().channels.len()).chain([3, 3])
     }
 
-    /// None if these are not as many images as there have to be.
+    /// Reads the images back; none if there are too few.
     pub fn from_images(images: Vec<Image>) -> Option<Self> {
         let mut images = images.into_iter();
         let first = images.next()?;
         let mut frame = Frame::new(first.width, first.height);
-        frame.set(SEEN[0], first);
-        SEEN[1..].iter().try_for_each(|&layer| images.next().map(|image| frame.set(layer, image)))?;
+        frame.set(LAYERS[0], first);
+        LAYERS[1..].iter().try_for_each(|&layer| images.next().map(|image| frame.set(layer, image)))?;
         let (image, error) = (images.next()?, images.next());
         Some(Self { frame, solution: Solution { image, error, notes: Vec::new() } })
     }
@@ -88,15 +89,15 @@ impl Seen {
 impl Journal {
     pub(super) fn stage(&self) -> Stage {
         match () {
-            () if !self.goals.is_empty() => Stage::Dealing,
-            () if self.notes.passes.is_empty() => Stage::Fresh,
-            () => Stage::Between,
+            () if !self.goals.is_empty() => Stage::InPass,
+            () if self.notes.passes.is_empty() => Stage::FirstPass,
+            () => Stage::BetweenPasses,
         }
     }
 
-    /// Ends a pass, after which there is this frame.
+    /// Ends a pass, with the frame after it.
     pub(super) fn learn(&mut self, after: &Frame) {
-        if let Some(Seen { frame, solution }) = self.before.take() {
+        if let Some(PreviousPass { frame, solution }) = self.previous.take() {
             self.notes.estimate.learn(&frame, &solution, after);
         }
         self.goals.clear();

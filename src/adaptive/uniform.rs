@@ -1,4 +1,4 @@
-//! As many samples for every pixel.
+//! The same number of samples for every pixel.
 
 use super::Allocator;
 use crate::error::Result;
@@ -14,7 +14,7 @@ impl Allocator for Uniform {
     }
 
     fn summary(&self) -> &'static str {
-        "as many samples for every pixel"
+        "the same number of samples for every pixel"
     }
 
     fn needs_error(&self) -> bool {

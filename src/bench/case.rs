@@ -42,7 +42,7 @@ impl Case {
         let wanted = (scene.sensor().width, scene.sensor().height);
         if wanted != there {
             let what = format!("has {}x{} pixels, not {}x{}", there.0, there.1, wanted.0, wanted.1);
-            return Err(Error::io(&file, what));
+            return Err(Error::mismatch(&file, what));
         }
         if let Some(known) = known {
             check(&known, &file, &scene)?;
@@ -69,7 +69,7 @@ fn truth(path: &Path) -> Result<(Truth, Option<String>)> {
     }
     let image = io::read_color(path)?;
     if let Some((x, y, _)) = image.not_finite() {
-        return Err(Error::io(path, format!("the value at pixel {x},{y} is not finite")));
+        return Err(Error::bad_data(path, format!("the value at pixel {x},{y} is not finite")));
     }
     Ok((Truth { image, floor: None }, None))
 }

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use super::case::Case;
 use super::record::{Record, Seconds, machine};
-use crate::adaptive::{self, Allocator, Limits};
+use crate::adaptive::{self, AdaptiveOutcome, AdaptiveSettings, Allocator, Limits};
 use crate::error::Result;
 use crate::film::{Frame, Needs};
 use crate::image::Image;
@@ -16,10 +16,9 @@ use crate::metrics::METRICS;
 use crate::plan::Plan;
 use crate::reconstruct::{self, Context, Reconstruction};
 use crate::reference::fingerprint;
-use crate::render::gradient::shift::Shift;
-use crate::render::{self, Control, Settings, render};
+use crate::render::{self, Control, RenderSettings, Shift, render};
 
-/// What a run may use up.
+/// Limit of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Budget {
     /// Seconds for render and reconstruction together.
@@ -47,29 +46,26 @@ impl fmt::Display for Budget {
     }
 }
 
-/// How long the parts of a run take on a scene, from trying.
+/// Durations of the parts of a run on a scene, measured beforehand.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Pilot {
-    /// One sample of every pixel.
+    /// Seconds of one sample of every pixel.
     pub sample: f64,
-    /// Develop and reconstruct.
+    /// Seconds of developing and reconstructing.
     pub finish: f64,
 }
 
-/// What a run is told.
+/// Everything that decides a run, besides scene and method.
 #[derive(Clone, Copy)]
-struct Terms<'a> {
+struct RunSpec<'a> {
     budget: Budget,
     seed: u64,
-    /// Seconds that the reconstruction is going to take.
+    /// Expected seconds of the reconstruction.
     finish: f64,
     stop: &'a AtomicBool,
 }
 
-/// Reconstructions that report to nobody.
-const QUIET: Context = Context { progress: &|_, _| {}, memory: None, notes: false };
-
-/// A method on a scene.
+/// A method to be run on a scene.
 pub struct Runner<'a> {
     /// The scene.
     pub case: &'a Case,
@@ -78,14 +74,13 @@ pub struct Runner<'a> {
     made: Box<dyn Reconstruction>,
     allocator: Option<&'static dyn Allocator>,
     needs: Needs,
-    lit: bool,
 }
 
 /// A run and its image.
-pub struct Ran {
-    /// What is kept of it.
+pub struct RunResult {
+    /// Figures that are stored.
     pub record: Record,
-    /// What was made.
+    /// The image.
     pub image: Image,
 }
 
@@ -95,17 +90,16 @@ impl<'a> Runner<'a> {
         let (id, allocator) = adaptive::parse(method)?;
         let made = reconstruct::parse(id)?;
         let needs = Plan::new(&case.scene, made.needs(), Needs::default()).needs;
-        let lit = needs.edges || !made.needs().edges;
-        Ok(Self { case, method, made, allocator, needs, lit })
+        Ok(Self { case, method, made, allocator, needs })
     }
 
-    /// Whether samples go where they are needed.
+    /// Whether sampling is adaptive.
     pub fn is_adaptive(&self) -> bool {
         self.allocator.is_some()
     }
 
-    fn settings(&self, budget: render::Budget, seed: u64) -> Settings {
-        Settings { budget, seed, first: 0, needs: self.needs, shift: Shift::default() }
+    fn settings(&self, budget: render::Budget, seed: u64) -> RenderSettings {
+        RenderSettings { budget, seed, first: 0, needs: self.needs, shift: Shift::default() }
     }
 
     fn frame(
@@ -114,27 +108,24 @@ impl<'a> Runner<'a> {
         seed: u64,
         stop: &AtomicBool,
         seconds: &mut Seconds,
-    ) -> (render::Outcome, Frame) {
-        let control = Control { stop, progress: &|_| {}, keeper: None };
+    ) -> (render::RenderOutcome, Frame) {
+        let control = Control { stop, progress: &|_| {}, sink: None };
         let outcome = render(&self.case.scene, self.settings(budget, seed), &control);
         seconds.render = outcome.elapsed.as_secs_f64();
         let start = Instant::now();
-        let mut frame = outcome.film.develop();
-        if !self.lit {
-            frame.fill_dark_edges();
-        }
+        let frame = outcome.film.develop();
         seconds.develop = start.elapsed().as_secs_f64();
         (outcome, frame)
     }
 
     fn finish(&self, frame: &Frame, seconds: &mut Seconds) -> Result<Image> {
         let start = Instant::now();
-        let image = reconstruct::solve(self.made.as_ref(), frame, &QUIET)?.image;
+        let image = reconstruct::solve(self.made.as_ref(), frame, &Context::QUIET)?.image;
         seconds.reconstruct = start.elapsed().as_secs_f64();
         Ok(image)
     }
 
-    /// Tries with two samples per pixel; the reconstruction twice, since the first may load libraries.
+    /// Measures with two samples per pixel; the reconstruction twice, since the first may load libraries.
     pub fn pilot(&self) -> Result<Pilot> {
         let mut seconds = Seconds::default();
         let (_, frame) = self.frame(render::Budget::Spp(2), 0, &AtomicBool::new(false), &mut seconds);
@@ -147,13 +138,13 @@ impl<'a> Runner<'a> {
         Ok(Pilot { sample: seconds.render / 2.0, finish })
     }
 
-    /// As many samples for every pixel. None if it was stopped.
-    fn straight(&self, terms: Terms, seconds: &mut Seconds) -> Result<Option<(render::Outcome, Image)>> {
-        let allowed = match terms.budget {
+    /// Runs with the same number of samples for every pixel. None if it was stopped.
+    fn straight(&self, spec: RunSpec, seconds: &mut Seconds) -> Result<Option<(render::RenderOutcome, Image)>> {
+        let allowed = match spec.budget {
             Budget::Spp(spp) => render::Budget::Spp(spp),
-            Budget::Seconds(total) => render::Budget::Time(Duration::from_secs_f64((total - terms.finish).max(1e-6))),
+            Budget::Seconds(total) => render::Budget::Time(Duration::from_secs_f64((total - spec.finish).max(1e-6))),
         };
-        let (outcome, frame) = self.frame(allowed, terms.seed, terms.stop, seconds);
+        let (outcome, frame) = self.frame(allowed, spec.seed, spec.stop, seconds);
         if outcome.stopped {
             return Ok(None);
         }
@@ -161,43 +152,42 @@ impl<'a> Runner<'a> {
         Ok(Some((outcome, image)))
     }
 
-    /// Samples where they are needed. None if it was stopped.
+    /// Runs with adaptive sampling. None if it was stopped.
     fn adapt(
         &self,
         allocator: &dyn Allocator,
-        terms: Terms,
+        spec: RunSpec,
         seconds: &mut Seconds,
-    ) -> Result<Option<(render::Outcome, Image)>> {
-        let limits = match terms.budget {
+    ) -> Result<Option<(render::RenderOutcome, Image)>> {
+        let limits = match spec.budget {
             Budget::Spp(spp) => Limits { spp: Some(spp), ..Limits::default() },
             Budget::Seconds(total) => Limits { time: Some(Duration::from_secs_f64(total)), ..Limits::default() },
         };
-        let settings = adaptive::Settings {
-            render: self.settings(render::Budget::Spp(1), terms.seed),
+        let settings = AdaptiveSettings {
+            render: self.settings(render::Budget::Spp(1), spec.seed),
             method: self.made.as_ref(),
             allocator,
             limits,
-            reconstruction: Some(Duration::from_secs_f64(terms.finish)),
-            lit: self.lit,
+            reconstruction: Some(Duration::from_secs_f64(spec.finish)),
         };
-        let control = Control { stop: terms.stop, progress: &|_| {}, keeper: None };
-        let outcome = adaptive::run(&self.case.scene, &settings, &control, &QUIET)?;
-        let adaptive::Outcome { render, solution, develop, reconstruct, .. } = outcome;
+        let control = Control { stop: spec.stop, progress: &|_| {}, sink: None };
+        let outcome = adaptive::run(&self.case.scene, &settings, &control, &Context::QUIET)?;
+        let AdaptiveOutcome { render, solution, develop, reconstruct, .. } = outcome;
         (seconds.render, seconds.develop, seconds.reconstruct) = (render.elapsed.as_secs_f64(), develop, reconstruct);
         Ok((!render.stopped).then_some((render, solution.image)))
     }
 
     /// Runs with a seed, within a budget; `pilot` says how long the reconstruction is going to take. None if `stop` was
     /// set before the samples were taken.
-    pub fn run(&self, budget: Budget, seed: u64, pilot: Pilot, stop: &AtomicBool) -> Result<Option<Ran>> {
+    pub fn run(&self, budget: Budget, seed: u64, pilot: Pilot, stop: &AtomicBool) -> Result<Option<RunResult>> {
         reset_peak();
         let mut seconds = Seconds { load: self.case.load, ..Seconds::default() };
         // Runs of different budgets do not share samples; those of different methods do.
         let salt = budget.to_string().bytes().fold(0, |hash, byte| rng::combine(hash, u64::from(byte)));
-        let terms = Terms { budget, seed: rng::combine(seed, salt), finish: pilot.finish, stop };
+        let spec = RunSpec { budget, seed: rng::combine(seed, salt), finish: pilot.finish, stop };
         let made = match self.allocator {
-            Some(allocator) => self.adapt(allocator, terms, &mut seconds)?,
-            None => self.straight(terms, &mut seconds)?,
+            Some(allocator) => self.adapt(allocator, spec, &mut seconds)?,
+            None => self.straight(spec, &mut seconds)?,
         };
         let Some((outcome, image)) = made else { return Ok(None) };
         seconds.total = seconds.render + seconds.develop + seconds.reconstruct;
@@ -228,7 +218,7 @@ impl<'a> Runner<'a> {
             machine: machine(),
             version: env!("CARGO_PKG_VERSION").into(),
         };
-        Ok(Some(Ran { record, image }))
+        Ok(Some(RunResult { record, image }))
     }
 }
 

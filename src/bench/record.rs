@@ -91,12 +91,12 @@ impl Results {
 
     /// All of it as JSON.
     pub fn json(&self) -> Result<String> {
-        serde_json::to_string_pretty(self).map_err(|error| Error::Usage(error.to_string()))
+        serde_json::to_string_pretty(self).map_err(|error| Error::backend("json", error))
     }
 
     /// One line for every record, with names above.
     pub fn csv(&self) -> Result<String> {
-        let failed = |error: csv::Error| Error::Usage(error.to_string());
+        let failed = |error: csv::Error| Error::backend("csv", error);
         let mut writer = csv::Writer::from_writer(Vec::new());
         let fixed = ["scene", "method", "budget", "seed", "width", "height", "spp"];
         let seconds = ["load_s", "render_s", "develop_s", "reconstruct_s", "total_s"];
@@ -116,7 +116,7 @@ impl Results {
             row.extend([record.machine.clone(), record.version.clone()]);
             writer.write_record(&row).map_err(failed)?;
         }
-        let bytes = writer.into_inner().map_err(|error| Error::Usage(error.to_string()))?;
+        let bytes = writer.into_inner().map_err(|error| Error::backend("csv", error))?;
         Ok(String::from_utf8_lossy(&bytes).into_owned())
     }
 }

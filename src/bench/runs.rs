@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::case::Case;
-use super::cell::{Budget, Pilot, Ran, Runner};
+use super::cell::{Budget, Pilot, RunResult, Runner};
 use super::record::LeftOut;
 use super::store::Store;
 use crate::error::Result;
@@ -35,7 +35,7 @@ impl Runs<'_> {
                         continue;
                     }
                     match candidates[which].run(budget, seed, stop) {
-                        Ok(Outcome::Ran(ran)) => store.add(*ran)?,
+                        Ok(Outcome::Finished(ran)) => store.add(*ran)?,
                         Ok(Outcome::TooLong(reason)) => store.leave_out(left_out(case, method, budget, reason)),
                         Ok(Outcome::Stopped) => return Ok(()),
                         Err(error) => store.leave_out(left_out(case, method, budget, format!("failed: {error}"))),
@@ -62,7 +62,7 @@ struct Candidate<'a> {
 }
 
 enum Outcome {
-    Ran(Box<Ran>),
+    Finished(Box<RunResult>),
     TooLong(String),
     Stopped,
 }
@@ -88,6 +88,6 @@ impl Candidate<'_> {
         if !self.runner.is_adaptive() {
             self.times = Some((tried, Pilot { finish: seconds.develop + seconds.reconstruct, ..last }));
         }
-        Ok(Outcome::Ran(Box::new(ran)))
+        Ok(Outcome::Finished(Box::new(ran)))
     }
 }

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::case::Case;
-use super::cell::{Budget, Ran};
+use super::cell::{Budget, RunResult};
 use super::record::{LeftOut, Record, Results, machine};
 use crate::error::{Error, Result};
 use crate::files;
@@ -67,8 +67,8 @@ impl Store {
     }
 
     /// Adds a run. The images of the first seed are kept.
-    pub fn add(&mut self, ran: Ran) -> Result<()> {
-        let Ran { record, image } = ran;
+    pub fn add(&mut self, ran: RunResult) -> Result<()> {
+        let RunResult { record, image } = ran;
         let file = (record.seed == 1).then(|| self.image_file(&record.scene, &record.method, &record.budget));
         let same = |left: &LeftOut| {
             (&left.scene, &left.method, &left.budget) == (&record.scene, &record.method, &record.budget)

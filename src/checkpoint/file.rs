@@ -1,13 +1,13 @@
 //! Checkpoints as files. All numbers are little-endian:
 //!
-//! | bytes | what |
+//! | bytes | content |
 //! |---|---|
 //! | 8 | `FLUXCKPT` |
 //! | 4 | version of the format |
 //! | 4 | length of the header |
-//! | | header, JSON: where the film comes from, how it went, notes of an adaptive run |
+//! | | header, JSON: origin of the film, seconds, first rejected sample, notes of an adaptive run |
 //! | | the film's statistics, tile by tile |
-//! | | of an adaptive run: every pixel's goal, and the images that it compares new samples with |
+//! | | of an adaptive run: every pixel's sample count goal, and the images of the pass before |
 //! | 4 | CRC-32 of everything before |
 
 use std::fs::File;
@@ -19,17 +19,17 @@ use crc32fast::Hasher;
 use serde::{Deserialize, Serialize};
 
 use super::{Checkpoint, Origin};
-use crate::adaptive::{Journal, Notes, Seen};
+use crate::adaptive::{Journal, Notes, PreviousPass};
 use crate::error::{Error, Result};
 use crate::files;
 use crate::film::{Film, Rejected};
 use crate::image::Image;
-use crate::render::{Outcome, SampleId};
+use crate::render::{RenderOutcome, SampleId};
 
 const MAGIC: [u8; 8] = *b"FLUXCKPT";
 
-/// Raised whenever the bytes change their meaning.
-const VERSION: u32 = 1;
+/// Version of the format: raised whenever the bytes change their meaning.
+const VERSION: u32 = 2;
 
 /// Headers longer than this are damaged.
 const MAX_HEADER: u32 = 1 << 20;
@@ -43,15 +43,15 @@ struct Header {
     adaptive: Option<Adaptive>,
 }
 
-/// What there is of a journal.
+/// The parts of a journal that follow.
 #[derive(Serialize, Deserialize)]
 struct Adaptive {
     notes: Notes,
     goals: bool,
-    seen: bool,
+    previous: bool,
 }
 
-/// Counts and sums up what passes through.
+/// A stream whose bytes are summed up on the way.
 struct Summed<T> {
     inner: T,
     sum: Hasher,
@@ -84,7 +84,7 @@ impl<T: Read> Read for Summed<T> {
 }
 
 /// Writes a checkpoint, which takes the place of what is at `path` when it is complete.
-pub fn save(path: &Path, origin: &Origin, outcome: &Outcome, journal: Option<&Journal>) -> Result<()> {
+pub fn save(path: &Path, origin: &Origin, outcome: &RenderOutcome, journal: Option<&Journal>) -> Result<()> {
     files::replace(path, |part| {
         let write = || {
             let mut to = Summed::new(BufWriter::with_capacity(1 << 20, File::create(part)?));
@@ -97,11 +97,11 @@ pub fn save(path: &Path, origin: &Origin, outcome: &Outcome, journal: Option<&Jo
     })
 }
 
-fn write(to: &mut impl Write, origin: &Origin, outcome: &Outcome, journal: Option<&Journal>) -> io::Result<()> {
+fn write(to: &mut impl Write, origin: &Origin, outcome: &RenderOutcome, journal: Option<&Journal>) -> io::Result<()> {
     let adaptive = journal.map(|journal| Adaptive {
         notes: journal.notes.clone(),
         goals: !journal.goals.is_empty(),
-        seen: journal.before.is_some(),
+        previous: journal.previous.is_some(),
     });
     let rejected = outcome.first_rejected.map(|(id, reason)| (id, reason.0.to_owned()));
     let mut origin = origin.clone();
@@ -117,7 +117,7 @@ fn write(to: &mut impl Write, origin: &Origin, outcome: &Outcome, journal: Optio
     outcome.film.write(to)?;
     let Some(journal) = journal else { return Ok(()) };
     journal.goals.iter().try_for_each(|goal| to.write_all(&goal.to_le_bytes()))?;
-    let images = journal.before.iter().flat_map(Seen::images);
+    let images = journal.previous.iter().flat_map(PreviousPass::images);
     images.flat_map(|image| &image.data).try_for_each(|value| to.write_all(&value.to_le_bytes()))
 }
 
@@ -140,7 +140,7 @@ pub fn load(path: &Path) -> Result<Checkpoint> {
     let mut stored = [0; 4];
     let ends = from.inner.read_exact(&mut stored).is_ok() && matches!(from.inner.read(&mut [0]), Ok(0));
     if !ends || u32::from_le_bytes(stored) != sum {
-        return Err(Error::io(path, "is damaged: its checksum is another one than that of its content"));
+        return Err(Error::io(path, "is damaged: its checksum is not that of its content"));
     }
     Ok(checkpoint)
 }
@@ -186,7 +186,7 @@ fn read(from: &mut impl Read, length: u64) -> io::Result<Checkpoint> {
     let elapsed = Duration::try_from_secs_f64(header.seconds).map_err(|error| invalid(error.to_string()))?;
     // Reasons are for the user's eyes: one that this version would not give is still one.
     let first_rejected = header.rejected.map(|(id, reason)| (id, Rejected::named(&reason)));
-    let outcome = Outcome { spp: film.fewest_samples(), film, elapsed, stopped: false, first_rejected };
+    let outcome = RenderOutcome { spp: film.fewest_samples(), film, elapsed, stopped: false, first_rejected };
     Ok(Checkpoint { origin: header.origin, outcome, journal })
 }
 
@@ -201,16 +201,16 @@ fn journal(adaptive: Adaptive, (width, height): (usize, usize), from: &mut impl 
         Ok(words.collect::<Vec<_>>())
     };
     let goals = if adaptive.goals { words(width * height)? } else { Vec::new() };
-    let mut before = None;
-    if adaptive.seen {
+    let mut previous = None;
+    if adaptive.previous {
         let mut images = Vec::new();
-        for channels in Seen::channels() {
+        for channels in PreviousPass::channels() {
             let data = words(width * height * channels)?.into_iter().map(f32::from_bits).collect();
             images.push(Image { width, height, channels, data });
         }
-        before = Seen::from_images(images);
+        previous = PreviousPass::from_images(images);
     }
-    Ok(Journal { notes: adaptive.notes, goals, before })
+    Ok(Journal { notes: adaptive.notes, goals, previous })
 }
 
 fn word(from: &mut impl Read) -> io::Result<u32> {

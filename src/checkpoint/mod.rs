@@ -1,4 +1,4 @@
-//! Checkpoints: a film in the making with all that it takes to go on with it, bit for bit, or to add it to others.
+//! Checkpoints: an unfinished film with everything that is needed to resume it, bit for bit, or to add it to others.
 
 mod file;
 mod origin;
@@ -8,39 +8,34 @@ use std::sync::Mutex;
 pub use self::file::{is_one, load, save};
 pub use self::origin::{Origin, Run, content};
 use crate::adaptive::{self, Journal};
-use crate::film::{Frame, Needs};
-use crate::render::Outcome;
+use crate::film::Frame;
+use crate::render::RenderOutcome;
 
 /// A film and where it comes from.
 pub struct Checkpoint {
-    /// What its samples were taken of, and which they are.
+    /// Scene, settings and sample numbers.
     pub origin: Origin,
-    /// The film and how it went.
-    pub outcome: Outcome,
+    /// The film, its time and its first rejected sample.
+    pub outcome: RenderOutcome,
     /// Decisions of an adaptive run.
     pub journal: Option<Journal>,
 }
 
 impl Checkpoint {
-    /// The render so far, to be gone on with.
-    pub fn begun(self, journal: &Mutex<Journal>) -> adaptive::Begun<'_> {
+    /// The render so far, to be resumed.
+    pub fn resume(self, journal: &Mutex<Journal>) -> adaptive::Start<'_> {
         *journal.lock().unwrap_or_else(|poisoned| poisoned.into_inner()) = self.journal.unwrap_or_default();
-        adaptive::Begun { render: self.outcome, journal }
+        adaptive::Start { render: self.outcome, journal }
     }
 
-    /// The film's means and variances. Differences that are known to be zero are there, too, if `needs` has some.
-    pub fn develop(&self, needs: Needs) -> Frame {
-        let mut frame = self.outcome.film.develop();
-        if self.origin.dark && needs.edges && !self.origin.needs.edges {
-            frame.fill_dark_edges();
-        }
-        frame.attributes = self.origin.attributes(&self.outcome);
-        frame
+    /// The film's means and variances.
+    pub fn develop(&self) -> Frame {
+        self.outcome.film.develop().with_provenance(self.origin.provenance(&self.outcome))
     }
 
-    /// Adds the samples of another, as if they had been taken after those here. Why not, if they are of another scene or
-    /// some of them are here already. Sums in single precision depend on their order: sorted by their runs, films have the
-    /// same sum whatever order they come in.
+    /// Adds the samples of another checkpoint, as if they had been taken after those here. The error is the reason why
+    /// they do not belong together. Sums in single precision depend on their order: callers sort films by their runs, so
+    /// that the order of arguments changes no bit.
     pub fn merge(&mut self, other: Self) -> Result<(), String> {
         self.origin.adds_to(&other.origin)?;
         self.outcome.film.merge(&other.outcome.film);

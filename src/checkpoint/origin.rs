@@ -1,4 +1,4 @@
-//! Where a film comes from: what its samples were taken of, and which of all samples they are.
+//! Where a film comes from: the scene and settings that its samples belong to, and their numbers.
 
 use std::fs::File;
 use std::io::Read;
@@ -7,30 +7,34 @@ use std::ops::Range;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
-use crate::film::Needs;
+use crate::film::{Needs, Provenance};
 use crate::math::rng;
-use crate::render::Outcome;
-use crate::render::gradient::shift::Shift;
+use crate::render::RenderOutcome;
+use crate::render::Shift;
 use crate::scene::Scene;
 
-/// What must agree for samples to belong together.
+/// Everything that must agree for samples to belong together.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Origin {
     /// Version of the program: samples of the same number are the same in one version only.
     pub version: String,
     /// Name of the scene file.
     pub scene: String,
-    /// [`content`] of the scene, in hexadecimal.
+    /// [`content`] of the scene, in hexadecimal: its text, meshes and images.
     pub content: String,
+    /// Fingerprint of the scene's text, in hexadecimal.
+    pub fingerprint: String,
+    /// Reconstruction that the render was made for.
+    pub method: String,
+    /// Summary of the plan.
+    pub plan: String,
     /// Columns and rows.
     pub size: (usize, usize),
-    /// What is recorded.
+    /// Statistics that are recorded.
     pub needs: Needs,
-    /// Whether there is no scattered light, so that all differences are known to be zero.
-    pub dark: bool,
     /// How differences are sampled.
     pub shift: Shift,
-    /// Which samples: those of a film that was merged come from several runs.
+    /// Numbers of the samples; a merged film has those of several runs.
     pub runs: Vec<Run>,
 }
 
@@ -50,18 +54,19 @@ impl Run {
         u64::from(self.first)..u64::from(self.first) + u64::from(self.samples)
     }
 
-    /// Whether some samples are in both.
+    /// Whether some samples belong to both.
     fn shares(&self, other: &Self) -> bool {
         let (a, b) = (self.numbers(), other.numbers());
         self.seed == other.seed && a.start < b.end && b.start < a.end
     }
 }
 
-/// Samples of a pixel that are more than anyone counts.
+/// Limit of a pixel's number of samples.
 const MOST: u64 = 1 << 31;
 
 impl Origin {
-    /// Whether films of both can be added: the same scene seen in the same way, by other samples. Why not, else.
+    /// Checks that films of both can be added: of the same scene, size and settings, with other samples. The error is the
+    /// reason why not.
     pub fn adds_to(&self, other: &Self) -> Result<(), String> {
         self.same_view(other)?;
         if self.needs != other.needs {
@@ -83,18 +88,18 @@ impl Origin {
         Ok(())
     }
 
-    /// Whether a film of this origin can be gone on with as `wanted`. Why not, else.
+    /// Checks that a film of this origin can be continued as `wanted`. The error is the reason why not.
     pub fn resumes(&self, wanted: &Self) -> Result<(), String> {
         self.same_view(wanted)?;
         if !self.needs.cover(wanted.needs) {
-            return Err("records less than this method and these layers need: begin anew, or choose others".into());
+            return Err("records less than this method and these layers need: start anew, or choose others".into());
         }
         let ([mine], [theirs]) = (self.runs.as_slice(), wanted.runs.as_slice()) else {
-            return Err("is merged of several renders: go on with one of them, and merge again".into());
+            return Err("is merged of several renders: resume one of them, and merge again".into());
         };
         if (mine.seed, mine.first) != (theirs.seed, theirs.first) {
             let first = if mine.first == 0 { String::new() } else { format!(" --first {}", mine.first) };
-            return Err(format!("was begun with --seed {}{first}: give it the same", mine.seed));
+            return Err(format!("was started with --seed {}{first}: give it the same", mine.seed));
         }
         Ok(())
     }
@@ -118,24 +123,25 @@ impl Origin {
             let size = |(width, height): (usize, usize)| format!("{width}x{height}");
             return differs("size", &size(self.size), &size(other.size));
         }
-        if self.needs.edges && other.needs.edges && self.shift != other.shift {
+        if self.needs.edges.is_sampled() && other.needs.edges.is_sampled() && self.shift != other.shift {
             return Err("samples differences by another --shift".into());
         }
         Ok(())
     }
 
-    /// The header attributes of images made of such a film.
-    pub fn attributes(&self, outcome: &Outcome) -> Vec<(String, String)> {
-        let spp = outcome.film.samples() as f64 / (self.size.0 * self.size.1) as f64;
+    /// Provenance of images made from such a film.
+    pub fn provenance(&self, outcome: &RenderOutcome) -> Provenance {
         let seeds: Vec<_> = self.runs.iter().map(|run| run.seed.to_string()).collect();
-        let pairs = [
-            ("version", self.version.clone()),
-            ("scene", self.scene.clone()),
-            ("seed", seeds.join(" ")),
-            ("spp", format!("{}", spp.round())),
-            ("seconds", format!("{:.3}", outcome.elapsed.as_secs_f64())),
-        ];
-        pairs.map(|(name, value)| (format!("fluxion:{name}"), value)).to_vec()
+        Provenance {
+            version: self.version.clone(),
+            scene: self.scene.clone(),
+            fingerprint: self.fingerprint.clone(),
+            seed: seeds.join(" "),
+            spp: format!("{}", outcome.film.mean_spp().round()),
+            seconds: format!("{:.3}", outcome.elapsed.as_secs_f64()),
+            method: self.method.clone(),
+            plan: self.plan.clone(),
+        }
     }
 }
 

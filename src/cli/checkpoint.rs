@@ -1,65 +1,65 @@
-//! Checkpoints of `render`: when they are written, and what they are gone on with.
+//! Checkpoints of `render`: when they are written, and how they are resumed.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard};
 use std::time::{Duration, Instant};
 
 use anyhow::{Result, bail};
-use fluxion::adaptive::{Begun, Journal};
+use fluxion::adaptive::{Journal, Start};
 use fluxion::checkpoint::{self, Checkpoint, Origin};
 use fluxion::error::Error;
 use fluxion::ffi::memory::say_what_is_kept;
-use fluxion::render::{self, Outcome};
+use fluxion::render::{self, RenderOutcome};
 
 use super::progress;
 
 /// Options of checkpoints.
 #[derive(clap::Args)]
 pub struct Args {
-    /// File to keep all samples in from time to time, so that an interrupted render can be gone on with
+    /// File to save all samples in from time to time, so that an interrupted render can be resumed
     #[arg(long, value_name = "FILE")]
     pub checkpoint: Option<PathBuf>,
-    /// Time between checkpoints; longer ones are taken less often, so that they use at most a twentieth of the time
+    /// Time between checkpoints; slow ones are written less often, so that they take at most a twentieth of the time
     #[arg(long, default_value = "60s", value_parser = super::parse_time, requires = "checkpoint", value_name = "TIME")]
     checkpoint_every: Duration,
-    /// Go on with what the checkpoint holds, if it is there already
+    /// Resume from the checkpoint, if it exists
     #[arg(long, requires = "checkpoint")]
     resume: bool,
 }
 
-/// Most of the time that writing checkpoints may take.
+/// Share of the time, inverted, that writing checkpoints may take.
 const SHARE: u32 = 20;
 
 impl Args {
-    /// Fails if there is a checkpoint already which is not to be gone on with. To be asked before the file is claimed.
+    /// Fails if there is a checkpoint that is not to be resumed. To be called before the file is claimed.
     pub fn check(&self) -> Result<()> {
         match &self.checkpoint {
             Some(path) if !self.resume && is_there(path) => bail!(Error::Usage(format!(
-                "{} is there already: go on with it by --resume, or remove it first",
+                "{} exists already: continue it by --resume, or remove it first",
                 path.display()
             ))),
             _ => Ok(()),
         }
     }
 
-    /// What is to be gone on with: nothing, unless it is asked for and there.
+    /// The checkpoint to resume from, if there is one and it is asked for.
     pub fn load(&self, wanted: &Origin) -> Result<Option<Checkpoint>> {
         let Some(path) = self.checkpoint.as_ref().filter(|path| self.resume && is_there(path)) else {
             return Ok(None);
         };
         let checkpoint = checkpoint::load(path)?;
-        checkpoint.origin.resumes(wanted).map_err(|why| Error::io(path, why))?;
+        checkpoint.origin.resumes(wanted).map_err(|why| Error::mismatch(path, why))?;
         Ok(Some(checkpoint))
     }
 
-    /// Who keeps a render of this origin; none if nobody is asked to.
-    pub fn keeper<'a>(&'a self, origin: Origin, begun: &Begun<'a>) -> Option<Keeper<'a>> {
+    /// The writer of checkpoints of a render, if they are asked for.
+    pub fn sink<'a>(&'a self, origin: Origin, start: &Start<'a>) -> Option<CheckpointWriter<'a>> {
         let now = Instant::now();
-        let kept = begun.render.film.samples();
+        let kept = start.render.film.samples();
         let state = State { next: now + self.checkpoint_every, kept, taken: now, failed: None };
         let (path, every) = (self.checkpoint.as_deref()?, self.checkpoint_every);
         say_what_is_kept(format!("; the last checkpoint, if there was time for one, is kept in {}", path.display()));
-        Some(Keeper { path, every, origin, journal: begun.journal, state: Mutex::new(state) })
+        Some(CheckpointWriter { path, every, origin, journal: start.journal, state: Mutex::new(state) })
     }
 }
 
@@ -68,7 +68,7 @@ fn is_there(path: &Path) -> bool {
 }
 
 /// Writes checkpoints while a render is under way.
-pub struct Keeper<'a> {
+pub struct CheckpointWriter<'a> {
     path: &'a Path,
     every: Duration,
     origin: Origin,
@@ -78,20 +78,20 @@ pub struct Keeper<'a> {
 
 struct State {
     next: Instant,
-    /// Samples in the last good checkpoint, and when it was taken.
+    /// Samples in the last complete checkpoint, and its time.
     kept: u64,
     taken: Instant,
-    /// Why the last one that was tried could not be written.
+    /// Error of the last checkpoint, if it could not be written.
     failed: Option<Error>,
 }
 
-impl Keeper<'_> {
+impl CheckpointWriter<'_> {
     fn state(&self) -> MutexGuard<'_, State> {
         self.state.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
     }
 
-    /// What becomes of a render: it has failed, too, if its last samples could not be kept; and where it has, samples
-    /// may be kept all the same.
+    /// The result of a render: it has failed, too, if its last checkpoint could not be written. The error says which
+    /// samples are saved all the same.
     pub fn conclude(&self, made: Result<()>) -> Result<()> {
         let mut state = self.state();
         match (made, state.failed.take()) {
@@ -105,10 +105,10 @@ impl Keeper<'_> {
         }
     }
 
-    /// Writes what there is now. The error says what is still there.
-    fn save(&self, outcome: &Outcome) -> Result<(), Error> {
+    /// Writes a checkpoint. The error says which one is still there.
+    fn write(&self, outcome: &RenderOutcome) -> Result<(), Error> {
         let journal = self.journal.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-        // Runs that decide nothing write nothing down.
+        // Runs without decisions have no journal.
         let decided = !journal.notes.passes.is_empty() || !journal.goals.is_empty();
         let start = Instant::now();
         let saved = checkpoint::save(self.path, &self.origin, outcome, decided.then_some(&*journal));
@@ -128,13 +128,13 @@ impl Keeper<'_> {
     }
 }
 
-impl render::Keeper for Keeper<'_> {
+impl render::CheckpointSink for CheckpointWriter<'_> {
     fn due(&self) -> bool {
         Instant::now() >= self.state().next
     }
 
-    fn keep(&self, outcome: &Outcome) {
-        let failed = self.save(outcome).err();
+    fn save(&self, outcome: &RenderOutcome) {
+        let failed = self.write(outcome).err();
         if let Some(error) = &failed {
             eprintln!("warning: no new checkpoint: {error}");
         }

@@ -135,7 +135,7 @@ fn describe(scene: &Scene, method: &str) -> Result<()> {
     println!("  film         {} bytes a pixel, 24 more where the camera sees an emitter", plan.needs.bytes_per_pixel());
     for item in plan.items {
         let verb = if item.computed { "computed" } else { "left out" };
-        println!("  {:<12} {verb}: {}", item.what, item.reason);
+        println!("  {:<12} {verb}: {}", item.name, item.reason);
     }
     Ok(())
 }

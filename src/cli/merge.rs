@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use anyhow::Result;
 use fluxion::checkpoint;
 use fluxion::error::Error;
-use fluxion::film::{Needs, exr};
+use fluxion::film::exr;
 
 use super::outputs::Claims;
 
@@ -34,11 +34,11 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let mut films = films.into_iter();
     let Some((mut all, first)) = films.next() else { return Ok(ExitCode::SUCCESS) };
     for (film, path) in films {
-        let refused = |why: String| Error::io(path, format!("cannot be added to {}: it {why}", first.display()));
+        let refused = |why: String| Error::mismatch(path, format!("cannot be added to {}: it {why}", first.display()));
         all.merge(film).map_err(refused)?;
     }
     if args.output.extension().is_some_and(|extension| extension == "exr") {
-        exr::save(&args.output, &all.develop(Needs::default()))?;
+        exr::save(&args.output, &all.develop())?;
     } else {
         checkpoint::save(&args.output, &all.origin, &all.outcome, None)?;
     }

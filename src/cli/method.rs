@@ -68,7 +68,12 @@ impl Args {
                 eprintln!("warning: the method {} makes nothing on its way", self.method);
             }
             for note in &solution.notes {
-                io::write_color(&folder.join(format!("{}.exr", note.name)), &note.image, &[], &frame.attributes)?;
+                io::write_color(
+                    &folder.join(format!("{}.exr", note.name)),
+                    &note.image,
+                    &[],
+                    &frame.provenance.attributes(),
+                )?;
             }
         }
         Ok(())
@@ -82,7 +87,7 @@ pub fn write(outputs: &[PathBuf], solution: &Solution, frame: &Frame, stats: &mu
     let error = solution.error.as_ref().map(|error| ("error", error));
     let samples = frame.get(Layer::Samples).map(|samples| ("samples", samples));
     let layers: Vec<_> = error.into_iter().chain(samples).collect();
-    let put = |path: &Path| io::write_color(path, &solution.image, &layers, &frame.attributes);
+    let put = |path: &Path| io::write_color(path, &solution.image, &layers, &frame.provenance.attributes());
     let (mut written, mut failed) = (Vec::new(), Vec::new());
     for path in outputs {
         match put(path) {

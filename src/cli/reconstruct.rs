@@ -40,22 +40,18 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let mut stats = Stats { method: args.method.method.clone(), ..Stats::default() };
     let start = Instant::now();
     let mut frame = if checkpoint::is_one(&args.layers) {
-        checkpoint::load(&args.layers)?.develop(method.needs())
+        checkpoint::load(&args.layers)?.develop()
     } else {
         exr::load(&args.layers)?
     };
     let _claims = Claims::new(&args.output, &[&args.json], &[&args.layers])?;
     stats.seconds.load = start.elapsed().as_secs_f64();
-    stats.spp = frame.attribute("fluxion:spp").and_then(|text| text.parse().ok()).unwrap_or(0);
-    stats.plan = frame.attribute("fluxion:plan").unwrap_or_default().to_owned();
+    stats.spp = frame.provenance.spp.parse().unwrap_or(0);
+    stats.plan.clone_from(&frame.provenance.plan);
     let sum = |layer| frame.get(layer).map_or(0.0, |image| image.data.iter().map(|&n| f64::from(n)).sum());
     (stats.samples, stats.rejected) = (sum(Layer::Samples) as u64, sum(Layer::Rejected) as u64);
     let solution = args.method.solve(method.as_ref(), &frame, args.quiet, &mut stats)?;
-    for (name, value) in &mut frame.attributes {
-        if name == "fluxion:method" {
-            value.clone_from(&args.method.method);
-        }
-    }
+    frame.provenance.method.clone_from(&args.method.method);
     method::write(&args.output, &solution, &frame, &mut stats)?;
     if let Some(path) = &args.json {
         stats.save(path)?;

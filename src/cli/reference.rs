@@ -79,7 +79,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     while let Some(spp) = next_wave(args, &reference) {
         bar.set_message(format!("{} spp, floor {:.1e}, next wave", reference.spp, reference.floor()));
         let report = |share| progress::set(&bar, share);
-        if !reference.add_wave(&scene, spp / 2, &Control { stop: &stop, progress: &report, keeper: None })? {
+        if !reference.add_wave(&scene, spp / 2, &Control { stop: &stop, progress: &report, sink: None })? {
             break;
         }
         reference.save(&args.output, args.half)?;
@@ -113,10 +113,13 @@ fn same(args: &Args, before: &Reference, size: (usize, usize)) -> Result<(), Err
             "has {}x{} pixels, not {}x{}: give it another --size or --output",
             there.0, there.1, size.0, size.1
         );
-        return Err(Error::io(&args.output, what));
+        return Err(Error::mismatch(&args.output, what));
     }
     if before.seed != args.seed {
-        return Err(Error::io(&args.output, format!("was begun with --seed {}: give it the same", before.seed)));
+        return Err(Error::mismatch(
+            &args.output,
+            format!("was started with --seed {}: give it the same", before.seed),
+        ));
     }
     Ok(())
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 use anyhow::Result;
 use fluxion::adaptive::Pass;
 use fluxion::files;
-use fluxion::render::Outcome;
+use fluxion::render::RenderOutcome;
 use serde::Serialize;
 
 /// Wall-clock seconds of the stages.
@@ -47,7 +47,7 @@ pub struct Stats {
 
 impl Stats {
     /// Takes over what a render took.
-    pub fn rendered(&mut self, outcome: &Outcome) {
+    pub fn rendered(&mut self, outcome: &RenderOutcome) {
         self.seconds.render = outcome.elapsed.as_secs_f64();
         let film = &outcome.film;
         (self.samples, self.rejected) = (film.samples(), film.rejected());

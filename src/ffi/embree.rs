@@ -59,7 +59,7 @@ unsafe impl Sync for DeviceHandle {}
 impl DeviceHandle {
     fn check(&self) -> Result<()> {
         let mut complaint = self.complaint.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-        complaint.take().map_or(Ok(()), |message| Err(Error::Embree(message)))
+        complaint.take().map_or(Ok(()), |message| Err(Error::backend("embree", message)))
     }
 }
 
@@ -91,14 +91,14 @@ impl Device {
 
     /// A device with a configuration string in Embree's own syntax.
     pub fn with_config(config: &str) -> Result<Self> {
-        let config = CString::new(config).map_err(|_| Error::Embree("configuration holds a NUL byte".into()))?;
+        let config = CString::new(config).map_err(|_| Error::backend("embree", "configuration holds a NUL byte"))?;
         let complaint = Box::new(Mutex::new(None));
         let user = std::ptr::from_ref::<Complaint>(&complaint).cast_mut().cast();
         // SAFETY: the string lives through the call; the complaint is boxed and outlives the device.
         let raw = unsafe { raw::fluxion_device_new(config.as_ptr(), Some(remember), user) };
         if raw.is_null() {
             let message = complaint.lock().ok().and_then(|mut slot| slot.take());
-            return Err(Error::Embree(message.unwrap_or_else(|| "out of memory".into())));
+            return Err(Error::backend("embree", message.unwrap_or_else(|| "out of memory".into())));
         }
         let device = Self(Arc::new(DeviceHandle { raw, complaint }));
         device.0.check()?;
@@ -206,7 +206,7 @@ impl SceneBuilder {
     /// Adds a triangle mesh and returns its geometry number. Every index must be below the vertex count.
     pub fn add_triangles(&mut self, vertices: &Arc<PaddedVertices>, indices: &Arc<Vec<[u32; 3]>>) -> Result<u32> {
         if indices.iter().flatten().any(|&index| index as usize >= vertices.len()) {
-            return Err(Error::Embree("a triangle names a vertex that does not exist".into()));
+            return Err(Error::backend("embree", "a triangle names a vertex that does not exist"));
         }
         // SAFETY: both buffers have the stated lengths, the vertices are padded, every index is in range, and
         // `self.0.buffers` keeps them alive and unmoved (they are behind Arcs) until the scene is released.
@@ -250,7 +250,7 @@ impl SceneBuilder {
     /// Adds another scene, placed by the columns of a matrix, and returns the instance's number.
     pub fn add_instance(&mut self, child: &Arc<Committed>, to_world: [f32; 16]) -> Result<u32> {
         if !Arc::ptr_eq(&child.0.device, &self.0.device) {
-            return Err(Error::Embree("an instance of a scene of another device".into()));
+            return Err(Error::backend("embree", "an instance of a scene of another device"));
         }
         // SAFETY: the child is committed, of the same device, and kept alive in `self.0.buffers`; the matrix is
         // copied during the call.

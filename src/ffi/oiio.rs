@@ -58,7 +58,7 @@ pub struct ImageFile<'a> {
     pub width: usize,
     /// Number of rows.
     pub height: usize,
-    /// Place of the first pixel in the file.
+    /// Index of the first pixel in the file.
     pub origin: (i32, i32),
     /// Channel names, in the order of the file.
     pub channels: Vec<String>,

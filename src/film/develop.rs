@@ -1,142 +1,133 @@
-//! Film to frame: sums become means, and the two ends of every edge are joined.
+//! Film to frame: sums become means and variances, and the two ends of every edge are joined.
 
-use super::sample::Moments;
-use super::{BINS, Bin, Film, Frame, Layer, Tile};
+use super::source::{Axis, Source};
+use super::statistic::{Record, Statistic};
+use super::{Film, Frame, Layer, Tile};
 use crate::image::Image;
 
-/// Positions of right, left, down and up among a pixel's twelve edge values.
-const RIGHT: usize = 0;
-const LEFT: usize = 3;
-const DOWN: usize = 6;
-const UP: usize = 9;
-
 impl Film {
-    /// Means and variances of the mean of everything recorded so far.
+    /// Means, and variances of the means, of everything recorded so far.
     pub fn develop(&self) -> Frame {
         let mut frame = Frame::new(self.width, self.height);
-        frame.set(Layer::Color, self.image(3, |tile, i, c| tile.color[i].mean[c]));
-        frame.set(Layer::ColorVariance, self.image(3, |tile, i, c| tile.color[i].variance_of_mean(c, tile.counts[i])));
-        frame.set(Layer::Direct, self.image(3, |tile, i, c| tile.direct.get(i).map_or(0.0, |direct| direct.mean[c])));
-        frame.set(
-            Layer::DirectVariance,
-            self.image(3, |tile, i, c| {
-                tile.direct.get(i).map_or(0.0, |direct| direct.variance_of_mean(c, tile.counts[i]))
+        for layer in Layer::all() {
+            if let Some(image) = self.develop_layer(layer) {
+                frame.set(layer, image);
+            }
+        }
+        frame
+    }
+
+    /// The image of a layer, if the film has it.
+    fn develop_layer(&self, layer: Layer) -> Option<Image> {
+        let (channels, source) = (layer.info().channels.len(), layer.info().source);
+        if !source.is_developed(self.needs) {
+            return None;
+        }
+        if source.record().is_some_and(|record| record.is_known_zero(self.needs)) {
+            return Some(Image::new(self.width, self.height, channels));
+        }
+        let bin = layer.bin_number().unwrap_or(0) as usize;
+        Some(match source {
+            Source::SampleCount => self.image(1, |tile, i, _| tile.counts[i] as f32),
+            Source::RejectedCount => {
+                self.image(1, |tile, i, _| tile.rejected.get(i).copied().unwrap_or_default() as f32)
+            }
+            Source::EdgeSampleCount => {
+                let differ = |tile: &Tile| !tile.edge_counts.is_empty() && tile.edge_counts != tile.counts;
+                if !self.tiles.iter().any(differ) {
+                    return None;
+                }
+                self.image(1, |tile, i, _| tile.edge_count(i) as f32)
+            }
+            Source::Mean(record, first) => {
+                self.image(channels, |tile, i, c| tile.values(record, i).map_or(0.0, |values| values[first + c]))
+            }
+            Source::Variance(record, first) => self.image(channels, |tile, i, c| tile.variance(record, i, first + c)),
+            Source::Bin(record) => self.image(channels, |tile, i, c| tile.bin(record, i, bin)[c]),
+            Source::EdgeMean(record, axis) => self.edge_image(axis, |tile, i, end, c| {
+                tile.values(record, i).map_or(0.0, |values| end.sign() * values[end.first(axis) + c])
             }),
-        );
-        frame.set(Layer::Samples, self.image(1, |tile, i, _| tile.counts[i] as f32));
-        frame
-            .set(Layer::Rejected, self.image(1, |tile, i, _| tile.rejected.get(i).copied().unwrap_or_default() as f32));
-        if self.needs.features {
-            self.develop_moments(&mut frame, [Layer::Albedo, Layer::AlbedoVariance], 0, |tile, i| &tile.features[i]);
-            self.develop_moments(&mut frame, [Layer::Normal, Layer::NormalVariance], 3, |tile, i| &tile.features[i]);
-            self.develop_moments(&mut frame, [Layer::Depth, Layer::DepthVariance], 6, |tile, i| &tile.features[i]);
-        }
-        if self.needs.occlusion {
-            let layers = [Layer::Occlusion, Layer::OcclusionVariance];
-            self.develop_moments(&mut frame, layers, 0, |tile, i| &tile.places[i]);
-        }
-        if self.needs.position {
-            self.develop_moments(&mut frame, [Layer::Position, Layer::PositionVariance], 1, |tile, i| &tile.places[i]);
-        }
-        if self.needs.edges {
-            for (mean, variance, here, there) in
-                [(Layer::Dx, Layer::DxVariance, RIGHT, LEFT), (Layer::Dy, Layer::DyVariance, DOWN, UP)]
-            {
-                let step = if here == RIGHT { (1, 0) } else { (0, 1) };
-                frame.set(
-                    mean,
-                    self.edge_image(step, |tile, i, near, c| {
-                        let end = if near { here } else { there };
-                        tile.edges[i].mean[end + c] * if near { 1.0 } else { -1.0 }
-                    }),
-                );
-                frame.set(
-                    variance,
-                    self.edge_image(step, |tile, i, near, c| {
-                        let moments: &Moments<12> = &tile.edges[i];
-                        moments.variance_of_mean(if near { here } else { there } + c, tile.counts[i])
-                    }),
-                );
+            Source::EdgeVariance(record, axis) => {
+                self.edge_image(axis, |tile, i, end, c| tile.variance(record, i, end.first(axis) + c))
             }
-        }
-        for k in 0..BINS as u8 {
-            if self.needs.bins {
-                let layers = [Layer::BinColor(k), Layer::BinDx(k), Layer::BinDy(k)];
-                self.develop_bin(&mut frame, layers, |tile, i| &tile.bins[i][k as usize]);
+            Source::EdgeBin(record, axis) => {
+                self.edge_image(axis, |tile, i, end, c| end.sign() * tile.bin(record, i, bin)[end.first(axis) + c])
             }
-            if self.needs.ambient {
-                let layers = [Layer::BinAmbient(k), Layer::BinAmbientDx(k), Layer::BinAmbientDy(k)];
-                self.develop_bin(&mut frame, layers, |tile, i| &tile.ambient[i][k as usize]);
-            }
-        }
-        frame
+        })
     }
 
-    /// Mean and variance of values from `first` on.
-    fn develop_moments<const N: usize>(
-        &self,
-        frame: &mut Frame,
-        [mean, variance]: [Layer; 2],
-        first: usize,
-        moments: fn(&Tile, usize) -> &Moments<N>,
-    ) {
-        let channels = mean.info().channels.len();
-        frame.set(mean, self.image(channels, |tile, i, c| moments(tile, i).mean[first + c]));
-        let of_mean = |tile: &Tile, i: usize, c| moments(tile, i).variance_of_mean(first + c, tile.counts[i]);
-        frame.set(variance, self.image(channels, of_mean));
-    }
-
-    fn develop_bin(&self, frame: &mut Frame, [color, dx, dy]: [Layer; 3], bin: impl Fn(&Tile, usize) -> &Bin) {
-        frame.set(color, self.image(3, |tile, i, c| bin(tile, i).color[c]));
-        if !self.needs.edges {
-            return;
-        }
-        for (layer, step, here, there) in [(dx, (1, 0), RIGHT, LEFT), (dy, (0, 1), DOWN, UP)] {
-            frame.set(
-                layer,
-                self.edge_image(step, |tile, i, near, c| {
-                    let end = if near { here } else { there } / 3;
-                    bin(tile, i).edges[end][c] * if near { 1.0 } else { -1.0 }
-                }),
-            );
-        }
-    }
-
-    /// The tile of a pixel and its position in it.
+    /// The tile of a pixel and the pixel's index in it.
     fn at(&self, x: usize, y: usize) -> (&Tile, usize) {
         let columns = self.width.div_ceil(super::TILE);
         let tile = &self.tiles[y / super::TILE * columns + x / super::TILE];
         (tile, (y - tile.y) * tile.width + (x - tile.x))
     }
 
+    /// An image from a function of tile, index in the tile, and channel.
     fn image(&self, channels: usize, value: impl Fn(&Tile, usize, usize) -> f32) -> Image {
         let mut image = Image::new(self.width, self.height, channels);
         for tile in &self.tiles {
             for i in 0..tile.counts.len() {
-                let pixel = image.pixel_mut(tile.x + i % tile.width, tile.y + i / tile.width);
-                pixel.iter_mut().enumerate().for_each(|(c, slot)| *slot = value(tile, i, c));
+                let (x, y) = tile.pixel(i);
+                image.pixel_mut(x, y).iter_mut().enumerate().for_each(|(c, slot)| *slot = value(tile, i, c));
             }
         }
         image
     }
 
-    /// Sums of a value at the near end (`true`) and the far end (`false`) of every edge along `step`.
-    fn edge_image(&self, step: (usize, usize), value: impl Fn(&Tile, usize, bool, usize) -> f32) -> Image {
+    /// Sums of a value at the near and at the far end of every edge along an axis. An edge that has been sampled from
+    /// one end only is left zero: half of it is no estimate.
+    fn edge_image(&self, axis: Axis, value: impl Fn(&Tile, usize, End, usize) -> f32) -> Image {
         let mut image = Image::new(self.width, self.height, 3);
-        for y in 0..self.height - step.1 {
-            for x in 0..self.width - step.0 {
-                let ((near, i), (far, j)) = (self.at(x, y), self.at(x + step.0, y + step.1));
-                // Half an edge is no estimate of it.
-                if near.counts[i] == 0 || far.counts[j] == 0 {
+        for y in 0..self.height - axis.step.1 {
+            for x in 0..self.width - axis.step.0 {
+                let ((near, i), (far, j)) = (self.at(x, y), self.at(x + axis.step.0, y + axis.step.1));
+                if near.edge_count(i) == 0 || far.edge_count(j) == 0 {
                     continue;
                 }
-                let pixel = image.pixel_mut(x, y);
-                pixel
-                    .iter_mut()
-                    .enumerate()
-                    .for_each(|(c, slot)| *slot = value(near, i, true, c) + value(far, j, false, c));
+                let pixel = image.pixel_mut(x, y).iter_mut().enumerate();
+                pixel.for_each(|(c, slot)| *slot = value(near, i, End::Near, c) + value(far, j, End::Far, c));
             }
         }
         image
+    }
+}
+
+/// An end of an edge.
+#[derive(Clone, Copy, PartialEq)]
+enum End {
+    Near,
+    Far,
+}
+
+impl End {
+    /// Sign with which the end's own "neighbour minus pixel" enters "far minus near".
+    fn sign(self) -> f32 {
+        if self == Self::Near { 1.0 } else { -1.0 }
+    }
+
+    /// Position of the end's values among the differences of its pixel.
+    fn first(self, axis: Axis) -> usize {
+        if self == Self::Near { axis.near } else { axis.far }
+    }
+}
+
+impl Tile {
+    /// Values of a statistic at pixel `i`; none if it is sparse and zero in the whole tile.
+    fn values(&self, record: Record, i: usize) -> Option<&[f32]> {
+        let stride = record.statistic().stride();
+        self.planes[record as usize].get(i * stride..(i + 1) * stride)
+    }
+
+    fn variance(&self, record: Record, i: usize, value: usize) -> f32 {
+        let statistic: &Statistic = record.statistic();
+        let count = self.count_of(statistic.of_edges, i);
+        self.values(record, i).map_or(0.0, |values| statistic.variance_of_mean(values, value, count))
+    }
+
+    /// Means of bin `k` at pixel `i`.
+    fn bin(&self, record: Record, i: usize, k: usize) -> &[f32] {
+        let Statistic { values, .. } = *record.statistic();
+        &self.planes[record as usize][i * record.statistic().stride() + k * values..][..values]
     }
 }

@@ -2,25 +2,19 @@
 
 use std::path::Path;
 
-use super::{Frame, Layer};
+use super::{Frame, Layer, Provenance};
 use crate::error::{Error, Result};
 use crate::image::Image;
 use crate::image::io::{Kind, Pixels, read, write};
 
-/// Header attributes that are carried from frame to frame.
-pub const ATTRIBUTES: &[&str] = &[
-    "fluxion:version",
-    "fluxion:scene",
-    "fluxion:fingerprint",
-    "fluxion:seed",
-    "fluxion:spp",
-    "fluxion:seconds",
-    "fluxion:method",
-    "fluxion:plan",
-];
-
 /// Writes every layer of a frame, without loss.
 pub fn save(path: &Path, frame: &Frame) -> Result<()> {
+    if frame.has_own_edges() {
+        return Err(Error::io(
+            path,
+            "files hold differences to the right and downwards only, not edges between other pixels",
+        ));
+    }
     let present: Vec<_> = frame.present().collect();
     let channels: Vec<String> = present.iter().flat_map(|(layer, _)| layer.channel_names()).collect();
     let mut data = Vec::with_capacity(frame.width * frame.height * channels.len());
@@ -29,13 +23,13 @@ pub fn save(path: &Path, frame: &Frame) -> Result<()> {
             data.extend_from_slice(&image.data[pixel * image.channels..(pixel + 1) * image.channels]);
         }
     }
-    let (width, height, attributes) = (frame.width, frame.height, frame.attributes.clone());
+    let (width, height, attributes) = (frame.width, frame.height, frame.provenance.attributes());
     write(path, &Pixels { width, height, channels, data, eight_bit: false, attributes }, Kind::Float, Some("zips"))
 }
 
-/// Reads the layers that a file has. Channels that belong to no layer are left aside.
+/// Reads the layers that a file has. Channels that belong to no layer are ignored.
 pub fn load(path: &Path) -> Result<Frame> {
-    let pixels = read(path, ATTRIBUTES)?;
+    let pixels = read(path, &Provenance::NAMES)?;
     let mut frame = Frame::new(pixels.width, pixels.height);
     for layer in Layer::all() {
         let find = |name: &String| pixels.channels.iter().position(|other| other == name);
@@ -48,6 +42,6 @@ pub fn load(path: &Path) -> Result<Frame> {
     if frame.get(Layer::Color).is_none() {
         return Err(Error::io(path, format!("no channels R, G, B among {}", pixels.channels.join(", "))));
     }
-    frame.attributes = pixels.attributes;
+    frame.provenance = Provenance::from_attributes(&pixels.attributes);
     Ok(frame)
 }

@@ -1,12 +1,14 @@
 //! Developed images.
 
-use super::BINS;
+use std::borrow::Cow;
+
 use super::layer::Layer;
-use super::sample::bin_count;
+use super::{BINS, Cross, EdgeParts, Edges, Provenance, bin_count};
 use crate::error::{Error, Result};
 use crate::image::Image;
+use crate::math::{Rgb, vec3};
 
-/// Means and variances of a film, as layers. One from memory and one read from a file are the same.
+/// Means and variances of a film, as layers. A frame developed in memory and one read from a file are the same.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Frame {
     /// Pixels in a row.
@@ -14,14 +16,22 @@ pub struct Frame {
     /// Number of rows.
     pub height: usize,
     layers: Vec<Option<Image>>,
-    /// Named strings: scene, seed, samples, version and so on.
-    pub attributes: Vec<(String, String)>,
+    /// Edges in place of the cross that the layers hold.
+    edges: Option<Edges>,
+    /// Scene, seed, samples, version and so on.
+    pub provenance: Provenance,
 }
 
 impl Frame {
     /// A frame without layers.
     pub fn new(width: usize, height: usize) -> Self {
-        Self { width, height, layers: vec![None; Layer::COUNT], attributes: Vec::new() }
+        let layers = vec![None; Layer::COUNT];
+        Self { width, height, layers, edges: None, provenance: Provenance::default() }
+    }
+
+    /// The same frame with its provenance.
+    pub fn with_provenance(self, provenance: Provenance) -> Self {
+        Self { provenance, ..self }
     }
 
     /// A layer, if it is there.
@@ -47,63 +57,112 @@ impl Frame {
         self.layers[layer.index()] = Some(image);
     }
 
-    /// Sets all differences to zero, as they are known to be in a scene without scattered light.
-    pub fn fill_dark_edges(&mut self) {
-        let black = Image::new(self.width, self.height, 3);
-        for layer in [Layer::Dx, Layer::DxVariance, Layer::Dy, Layer::DyVariance] {
-            self.set(layer, black.clone());
-        }
-        for k in 0..BINS as u8 {
-            for (color, edges) in [
-                (Layer::BinColor(k), [Layer::BinDx(k), Layer::BinDy(k)]),
-                (Layer::BinAmbient(k), [Layer::BinAmbientDx(k), Layer::BinAmbientDy(k)]),
-            ] {
-                if self.get(color).is_some() {
-                    edges.into_iter().for_each(|edge| self.set(edge, black.clone()));
-                }
-            }
-        }
-    }
-
     /// The layers that are there.
     pub fn present(&self) -> impl Iterator<Item = (Layer, &Image)> {
         Layer::all().filter_map(|layer| Some((layer, self.get(layer)?)))
     }
 
-    /// Mean and variance of the mean of the samples in every other bin, from `first` (0 or 1) on. `bin` is one of the
-    /// constructors of binned layers. Where these bins are empty, the value is that of the other bins; the variance is
-    /// zero where only one of the bins has samples.
-    pub fn half(&self, bin: fn(u8) -> Layer, first: usize) -> Result<[Image; 2]> {
-        let bins = (0..BINS).map(|k| self.require(bin(k as u8))).collect::<Result<Vec<_>>>()?;
-        let samples = self.require(Layer::Samples)?;
-        let step = match bin(0) {
-            Layer::BinDx(_) => (1, 0),
-            Layer::BinDy(_) => (0, 1),
-            _ => (0, 0),
-        };
-        let [mut mean, mut variance] = [(); 2].map(|()| Image::new(self.width, self.height, 3));
-        for (x, y) in (0..self.height).flat_map(|y| (0..self.width).map(move |x| (x, y))) {
-            // An edge has both ends.
-            let far = (self.width.min(x + step.0 + 1) - 1, self.height.min(y + step.1 + 1) - 1);
-            let samples = samples.pixel(x, y)[0].min(samples.pixel(far.0, far.1)[0]) as u32;
-            let count = |k: usize| f64::from(bin_count(samples, k));
-            let half: Vec<usize> = (first..BINS).step_by(2).filter(|&k| count(k) > 0.0).collect();
-            let used = if half.is_empty() { (0..BINS).filter(|&k| count(k) > 0.0).collect() } else { half };
-            let total: f64 = used.iter().map(|&k| count(k)).sum();
-            for c in 0..3 {
-                let value = |k: usize| f64::from(bins[k].pixel(x, y)[c]);
-                let mean_of = used.iter().map(|&k| count(k) * value(k)).sum::<f64>() / total.max(1.0);
-                let squares: f64 = used.iter().map(|&k| count(k) * (value(k) - mean_of).powi(2)).sum();
-                mean.pixel_mut(x, y)[c] = mean_of as f32;
-                let freedom = (used.len() as f64 - 1.0).max(1.0);
-                variance.pixel_mut(x, y)[c] = (squares / freedom / total.max(1.0)) as f32;
+    /// Replaces the differences of the layers by edges between any pixels. Files hold the layers only.
+    pub fn set_edges(&mut self, edges: Edges) {
+        assert_eq!(edges.pixels(), self.width * self.height, "edges of another size");
+        self.edges = Some(edges);
+    }
+
+    /// Whether the differences are those of [`Frame::set_edges`] instead of layers.
+    pub fn has_own_edges(&self) -> bool {
+        self.edges.is_some()
+    }
+
+    /// Differences to the right and downwards as images. The error names the layer that is missing, or says that the
+    /// edges are others.
+    pub fn cross(&self) -> Result<Cross<'_>> {
+        if self.edges.is_some() {
+            let remedy = "this method takes differences to the right and downwards only, and the frame has edges between \
+                          other pixels";
+            return Err(Error::Missing { layer: Layer::Dx.channel_names().join(", "), remedy: remedy.into() });
+        }
+        Ok(Cross {
+            mean: [self.require(Layer::Dx)?, self.require(Layer::Dy)?],
+            variance: [self.get(Layer::DxVariance), self.get(Layer::DyVariance)],
+        })
+    }
+
+    /// The frame's edges, with the parts that are asked for. The error names the layer that is missing.
+    pub fn edges(&self, parts: EdgeParts) -> Result<Cow<'_, Edges>> {
+        match &self.edges {
+            Some(edges) => {
+                for (wanted, there, layer) in [
+                    (parts.variance, !edges.variance.is_empty(), Layer::DxVariance),
+                    (parts.bins, !edges.bins.is_empty(), Layer::BinDx(0)),
+                    (parts.ambient, !edges.ambient.is_empty(), Layer::BinAmbientDx(0)),
+                ] {
+                    if wanted && !there && !edges.is_empty() {
+                        self.require(layer)?;
+                    }
+                }
+                Ok(Cow::Borrowed(edges))
             }
+            None => Ok(Cow::Owned(self.edges_of_layers(parts)?)),
+        }
+    }
+
+    fn edges_of_layers(&self, parts: EdgeParts) -> Result<Edges> {
+        let mut edges = Edges::cross((self.width, self.height));
+        let values = |of_axis: [&Image; 2], edge: usize| {
+            let rgb = &of_axis[edges.kind(edge)].data[3 * edges.ends(edge)[0]..][..3];
+            vec3(rgb[0], rgb[1], rgb[2])
+        };
+        let pair = |layers: [Layer; 2]| Ok::<_, Error>([self.require(layers[0])?, self.require(layers[1])?]);
+        let all = |layers| {
+            let of_axis = pair(layers)?;
+            Ok::<Vec<Rgb>, Error>((0..edges.len()).map(|edge| values(of_axis, edge)).collect())
+        };
+        let binned = |layers: [fn(u8) -> Layer; 2]| {
+            let bins = (0..BINS as u8).map(|k| pair(layers.map(|layer| layer(k)))).collect::<Result<Vec<_>>>()?;
+            let of_edge = |edge| std::array::from_fn(|k| values(bins[k], edge));
+            Ok::<Vec<[Rgb; BINS]>, Error>((0..edges.len()).map(of_edge).collect())
+        };
+        let mean = all([Layer::Dx, Layer::Dy])?;
+        let variance = if parts.variance { all([Layer::DxVariance, Layer::DyVariance])? } else { Vec::new() };
+        let bins = if parts.bins { binned([Layer::BinDx, Layer::BinDy])? } else { Vec::new() };
+        let ambient = if parts.ambient { binned([Layer::BinAmbientDx, Layer::BinAmbientDy])? } else { Vec::new() };
+        let counts = if parts.bins || parts.ambient { self.edge_counts(&edges)? } else { Vec::new() };
+        (edges.mean, edges.variance, edges.bins, edges.ambient, edges.counts) = (mean, variance, bins, ambient, counts);
+        Ok(edges)
+    }
+
+    /// Samples with differences that either end of every edge has at least.
+    fn edge_counts(&self, edges: &Edges) -> Result<Vec<u32>> {
+        let samples = self.get(Layer::EdgeSamples).map_or_else(|| self.require(Layer::Samples), Ok)?;
+        let least = |edge| edges.ends(edge).map(|end| samples.data[end] as u32).into_iter().min().unwrap_or(0);
+        Ok((0..edges.len()).map(least).collect())
+    }
+
+    /// Mean of the colour of the samples in every other bin, from `first` (0 or 1) on, and the variance of that mean.
+    pub fn color_half(&self, first: usize) -> Result<[Image; 2]> {
+        let bins = (0..BINS).map(|k| self.require(Layer::BinColor(k as u8))).collect::<Result<Vec<_>>>()?;
+        let samples = self.require(Layer::Samples)?;
+        let [mut mean, mut variance] = [(); 2].map(|()| Image::new(self.width, self.height, 3));
+        for i in 0..mean.data.len() {
+            let values = std::array::from_fn(|k| bins[k].data[i]);
+            (mean.data[i], variance.data[i]) = half(values, samples.data[i / 3] as u32, first);
         }
         Ok([mean, variance])
     }
+}
 
-    /// The attribute `name`.
-    pub fn attribute(&self, name: &str) -> Option<&str> {
-        self.attributes.iter().find(|(key, _)| key == name).map(|(_, value)| value.as_str())
-    }
+/// Mean of every other bin, from `first` (0 or 1) on, and the variance of that mean, from the bins' means of `samples`
+/// samples. Where these bins are empty, the mean is that of the others; the variance is zero where only one bin has
+/// samples.
+pub fn half(bins: [f32; BINS], samples: u32, first: usize) -> (f32, f32) {
+    let count = |k: usize| f64::from(bin_count(samples, k));
+    let in_half = |k: usize| k % 2 == first && count(k) > 0.0;
+    let empty = !(0..BINS).any(in_half);
+    let used = || (0..BINS).filter(|&k| if empty { count(k) > 0.0 } else { in_half(k) });
+    let value = |k: usize| f64::from(bins[k]);
+    let total: f64 = used().map(count).sum();
+    let mean = used().map(|k| count(k) * value(k)).sum::<f64>() / total.max(1.0);
+    let squares: f64 = used().map(|k| count(k) * (value(k) - mean).powi(2)).sum();
+    let freedom = (used().count() as f64 - 1.0).max(1.0);
+    (mean as f32, (squares / freedom / total.max(1.0)) as f32)
 }

@@ -1,6 +1,8 @@
-//! The table of layers: every image that rendering can leave behind, with its name in files, unit and range.
+//! The table of layers: every image that a film develops into, with its name in files, its unit and range, and the
+//! statistic that its values come from.
 
 use super::BINS;
+use super::source::{Source, X, Y};
 
 /// A named image. The bins' layers carry the bin's number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -9,11 +11,11 @@ pub enum Layer {
     Color,
     /// Variance of [`Layer::Color`].
     ColorVariance,
-    /// Radiance of emitters seen directly.
+    /// Radiance of emitters that the camera sees directly.
     Direct,
     /// Variance of [`Layer::Direct`].
     DirectVariance,
-    /// Material colour.
+    /// Albedo of the material.
     Albedo,
     /// Variance of [`Layer::Albedo`].
     AlbedoVariance,
@@ -21,7 +23,7 @@ pub enum Layer {
     Normal,
     /// Variance of [`Layer::Normal`].
     NormalVariance,
-    /// Distance.
+    /// Path length from the camera.
     Depth,
     /// Variance of [`Layer::Depth`].
     DepthVariance,
@@ -43,6 +45,8 @@ pub enum Layer {
     DyVariance,
     /// Sample counts.
     Samples,
+    /// Counts of samples with differences, where these are others than [`Layer::Samples`].
+    EdgeSamples,
     /// Counts of samples that were not finite.
     Rejected,
     /// Colour of one bin.
@@ -51,15 +55,15 @@ pub enum Layer {
     BinDx(u8),
     /// Vertical differences of one bin.
     BinDy(u8),
-    /// Ambient light of one bin.
+    /// Radiance that an ambient light would add, of one bin.
     BinAmbient(u8),
-    /// Its horizontal differences.
+    /// Horizontal differences of the ambient light, of one bin.
     BinAmbientDx(u8),
-    /// Its vertical differences.
+    /// Vertical differences of the ambient light, of one bin.
     BinAmbientDy(u8),
 }
 
-/// What is to be known of a layer.
+/// A row of the table of layers.
 #[derive(Clone, Copy, Debug)]
 pub struct Info {
     /// Part of the channel names before the dot; empty for the colour itself.
@@ -72,157 +76,217 @@ pub struct Info {
     pub range: &'static str,
     /// The option of `render` that records it.
     pub flag: &'static str,
-    /// What it is.
+    /// Description for tables.
     pub summary: &'static str,
+    pub(super) source: Source,
 }
 
 const RGB: &[&str] = &["R", "G", "B"];
 const XYZ: &[&str] = &["X", "Y", "Z"];
-const Z: &[&str] = &["Z"];
-const Y: &[&str] = &["Y"];
 
+/// A row from its unit, range and flag.
 const fn info(
     name: &'static str,
     channels: &'static [&'static str],
     [unit, range, flag]: [&'static str; 3],
+    source: Source,
     summary: &'static str,
 ) -> Info {
-    Info { name, channels, unit, range, flag, summary }
+    Info { name, channels, unit, range, flag, summary, source }
 }
 
-/// Layers that are there once, in the order of the enumeration.
-const SINGLE: [(Layer, Info); 20] = [
-    (
-        Layer::Color,
-        info("", RGB, ["radiance", ">= 0", "always"], "scattered radiance without `direct`: mean of all samples"),
-    ),
-    (
-        Layer::ColorVariance,
-        info("variance", RGB, ["radiance²", ">= 0", "always"], "variance of the mean of the colour"),
-    ),
-    (
-        Layer::Direct,
-        info(
-            "direct",
-            RGB,
-            ["radiance", ">= 0", "always"],
-            "emitters that the camera sees directly; add it to the colour",
+/// Layers that a frame has once, in the order of the enumeration.
+const SINGLE: [(Layer, Info); 21] = {
+    use self::Layer as L;
+    use self::Source::{EdgeMean, EdgeSampleCount, EdgeVariance, Mean, RejectedCount, SampleCount, Variance};
+    use super::statistic::Record::{Color, Direct, Edges, Occlusion, Position, Surface};
+    const RADIANCE: [&str; 3] = ["radiance", ">= 0", "always"];
+    const RADIANCE_VARIANCE: [&str; 3] = ["radiance²", ">= 0", "always"];
+    const DIFFERENCE: [&str; 3] = ["radiance", "any", "--method l2"];
+    const DIFFERENCE_VARIANCE: [&str; 3] = ["radiance²", ">= 0", "--method l2"];
+    const UNIT_VARIANCE: [&str; 3] = ["1", ">= 0", "--layers"];
+    const COUNT: [&str; 3] = ["count", ">= 0", "always"];
+    [
+        (L::Color, info("", RGB, RADIANCE, Mean(Color, 0), "scattered radiance without `direct`: mean of all samples")),
+        (
+            L::ColorVariance,
+            info("variance", RGB, RADIANCE_VARIANCE, Variance(Color, 0), "variance of the mean of the colour"),
         ),
-    ),
-    (
-        Layer::DirectVariance,
-        info("direct_variance", RGB, ["radiance²", ">= 0", "always"], "variance of the mean of `direct`"),
-    ),
-    (
-        Layer::Albedo,
-        info(
-            "albedo",
-            RGB,
-            ["1", "[0, 1]", "--layers"],
-            "material colour at the first surface that is no mirror or clear glass",
+        (
+            L::Direct,
+            info(
+                "direct",
+                RGB,
+                RADIANCE,
+                Mean(Direct, 0),
+                "emitters that the camera sees directly; add it to the colour",
+            ),
         ),
-    ),
-    (
-        Layer::AlbedoVariance,
-        info("albedo_variance", RGB, ["1", ">= 0", "--layers"], "variance of the mean of the albedo"),
-    ),
-    (
-        Layer::Normal,
-        info("normal", XYZ, ["1", "[-1, 1]", "--layers"], "shading normal there, in world space, towards the viewer"),
-    ),
-    (
-        Layer::NormalVariance,
-        info("normal_variance", XYZ, ["1", ">= 0", "--layers"], "variance of the mean of the normal"),
-    ),
-    (
-        Layer::Depth,
-        info(
-            "depth",
-            Z,
-            ["scene units", ">= 0", "--layers"],
-            "length of the path to there; beyond the scene where nothing is hit",
+        (
+            L::DirectVariance,
+            info("direct_variance", RGB, RADIANCE_VARIANCE, Variance(Direct, 0), "variance of the mean of `direct`"),
         ),
-    ),
-    (
-        Layer::DepthVariance,
-        info("depth_variance", Z, ["scene units²", ">= 0", "--layers"], "variance of the mean of the depth"),
-    ),
-    (
-        Layer::Occlusion,
-        info(
-            "occlusion",
-            Y,
-            ["1", "[0, 1]", "--occlusion"],
-            "ambient occlusion there: share of directions, by their cosine, that are open for a tenth of the scene",
+        (
+            L::Albedo,
+            info(
+                "albedo",
+                RGB,
+                ["1", "[0, 1]", "--layers"],
+                Mean(Surface, 0),
+                "albedo of the first surface that is no mirror or clear glass",
+            ),
         ),
-    ),
-    (
-        Layer::OcclusionVariance,
-        info("occlusion_variance", Y, ["1", ">= 0", "--occlusion"], "variance of the mean of the occlusion"),
-    ),
-    (
-        Layer::Position,
-        info(
-            "position",
-            XYZ,
-            ["scene units", "any", "--position"],
-            "the point, in world space; beyond the scene where nothing is hit",
+        (
+            L::AlbedoVariance,
+            info("albedo_variance", RGB, UNIT_VARIANCE, Variance(Surface, 0), "variance of the mean of the albedo"),
         ),
-    ),
-    (
-        Layer::PositionVariance,
-        info("position_variance", XYZ, ["scene units²", ">= 0", "--position"], "variance of the mean of the position"),
-    ),
-    (
-        Layer::Dx,
-        info(
-            "dx",
-            RGB,
-            ["radiance", "any", "--method l2"],
-            "colour(x + 1, y) - colour(x, y); zero in the last column, which has no edge",
+        (
+            L::Normal,
+            info(
+                "normal",
+                XYZ,
+                ["1", "[-1, 1]", "--layers"],
+                Mean(Surface, 3),
+                "shading normal there, in world space, towards the viewer",
+            ),
         ),
-    ),
-    (Layer::DxVariance, info("dx_variance", RGB, ["radiance²", ">= 0", "--method l2"], "variance of dx")),
-    (
-        Layer::Dy,
-        info(
-            "dy",
-            RGB,
-            ["radiance", "any", "--method l2"],
-            "colour(x, y + 1) - colour(x, y); zero in the last row, which has no edge",
+        (
+            L::NormalVariance,
+            info("normal_variance", XYZ, UNIT_VARIANCE, Variance(Surface, 3), "variance of the mean of the normal"),
         ),
-    ),
-    (Layer::DyVariance, info("dy_variance", RGB, ["radiance²", ">= 0", "--method l2"], "variance of dy")),
-    (Layer::Samples, info("samples", Y, ["count", ">= 0", "always"], "samples of the pixel")),
-    (
-        Layer::Rejected,
-        info("rejected", Y, ["count", ">= 0", "always"], "samples that were not finite and count as zero"),
-    ),
-];
+        (
+            L::Depth,
+            info(
+                "depth",
+                &["Z"],
+                ["scene units", ">= 0", "--layers"],
+                Mean(Surface, 6),
+                "length of the path to there; beyond the scene where nothing is hit",
+            ),
+        ),
+        (
+            L::DepthVariance,
+            info(
+                "depth_variance",
+                &["Z"],
+                ["scene units²", ">= 0", "--layers"],
+                Variance(Surface, 6),
+                "variance of the mean of the depth",
+            ),
+        ),
+        (
+            L::Occlusion,
+            info(
+                "occlusion",
+                &["Y"],
+                ["1", "[0, 1]", "--occlusion"],
+                Mean(Occlusion, 0),
+                "ambient occlusion there: cosine-weighted share of directions that are free for a tenth of the scene's size",
+            ),
+        ),
+        (
+            L::OcclusionVariance,
+            info(
+                "occlusion_variance",
+                &["Y"],
+                ["1", ">= 0", "--occlusion"],
+                Variance(Occlusion, 0),
+                "variance of the mean of the occlusion",
+            ),
+        ),
+        (
+            L::Position,
+            info(
+                "position",
+                XYZ,
+                ["scene units", "any", "--position"],
+                Mean(Position, 0),
+                "the point, in world space; beyond the scene where nothing is hit",
+            ),
+        ),
+        (
+            L::PositionVariance,
+            info(
+                "position_variance",
+                XYZ,
+                ["scene units²", ">= 0", "--position"],
+                Variance(Position, 0),
+                "variance of the mean of the position",
+            ),
+        ),
+        (
+            L::Dx,
+            info(
+                "dx",
+                RGB,
+                DIFFERENCE,
+                EdgeMean(Edges, X),
+                "colour(x + 1, y) - colour(x, y); zero in the last column, which has no edge",
+            ),
+        ),
+        (L::DxVariance, info("dx_variance", RGB, DIFFERENCE_VARIANCE, EdgeVariance(Edges, X), "variance of dx")),
+        (
+            L::Dy,
+            info(
+                "dy",
+                RGB,
+                DIFFERENCE,
+                EdgeMean(Edges, Y),
+                "colour(x, y + 1) - colour(x, y); zero in the last row, which has no edge",
+            ),
+        ),
+        (L::DyVariance, info("dy_variance", RGB, DIFFERENCE_VARIANCE, EdgeVariance(Edges, Y), "variance of dy")),
+        (L::Samples, info("samples", &["Y"], COUNT, SampleCount, "samples of the pixel")),
+        (
+            L::EdgeSamples,
+            info(
+                "edge_samples",
+                &["Y"],
+                ["count", ">= 0", "--method l2"],
+                EdgeSampleCount,
+                "samples of the pixel that its differences were sampled with; absent where that is all of them",
+            ),
+        ),
+        (L::Rejected, info("rejected", &["Y"], COUNT, RejectedCount, "samples that were not finite and count as zero")),
+    ]
+};
 
-const BINNED: [Info; 6] = [
-    info("bin", RGB, ["radiance", ">= 0", "--bins"], "colour of the samples whose number is k modulo 8"),
-    info("bin_dx", RGB, ["radiance", "any", "--bins"], "dx of those samples"),
-    info("bin_dy", RGB, ["radiance", "any", "--bins"], "dy of those samples"),
-    info(
-        "bin_ambient",
-        RGB,
-        ["1", ">= 0", "--ambient"],
-        "what an ambient light of radiance one, blocked by nothing, adds to their colour",
-    ),
-    info("bin_ambient_dx", RGB, ["1", "any", "--ambient"], "what it adds to their dx"),
-    info("bin_ambient_dy", RGB, ["1", "any", "--ambient"], "what it adds to their dy"),
-];
+/// Layers that every bin has.
+const BINNED: [Info; 6] = {
+    use self::Source::{Bin, EdgeBin};
+    use super::statistic::Record::{AmbientBins, AmbientEdgeBins, ColorBins, EdgeBins};
+    const DIFFERENCE: [&str; 3] = ["radiance", "any", "--bins"];
+    const AMBIENT_DIFFERENCE: [&str; 3] = ["1", "any", "--ambient"];
+    [
+        info(
+            "bin",
+            RGB,
+            ["radiance", ">= 0", "--bins"],
+            Bin(ColorBins),
+            "colour of the samples whose number is k modulo 8",
+        ),
+        info("bin_dx", RGB, DIFFERENCE, EdgeBin(EdgeBins, X), "dx of those samples"),
+        info("bin_dy", RGB, DIFFERENCE, EdgeBin(EdgeBins, Y), "dy of those samples"),
+        info(
+            "bin_ambient",
+            RGB,
+            ["1", ">= 0", "--ambient"],
+            Bin(AmbientBins),
+            "radiance that an unoccluded ambient light of radiance one would add to their colour",
+        ),
+        info("bin_ambient_dx", RGB, AMBIENT_DIFFERENCE, EdgeBin(AmbientEdgeBins, X), "dx of that radiance"),
+        info("bin_ambient_dy", RGB, AMBIENT_DIFFERENCE, EdgeBin(AmbientEdgeBins, Y), "dy of that radiance"),
+    ]
+};
 
-/// A bin's layers, in the order of [`BINNED`].
+/// Constructors of a bin's layers, in the order of [`BINNED`].
 const OF_BIN: [fn(u8) -> Layer; BINNED.len()] =
     [Layer::BinColor, Layer::BinDx, Layer::BinDy, Layer::BinAmbient, Layer::BinAmbientDx, Layer::BinAmbientDy];
 
 impl Layer {
-    /// Whether a value below zero is a mistake: variances and counts. Radiance may be negative where someone has filtered
-    /// it.
+    /// Whether a value below zero is a mistake, as in variances and counts. Filtered radiance may be negative.
     pub fn is_never_negative(self) -> bool {
-        matches!(self, Self::Samples | Self::Rejected) || self.info().name.ends_with("variance")
+        matches!(self, Self::Samples | Self::EdgeSamples | Self::Rejected) || self.info().name.ends_with("variance")
     }
 
     /// Number of layers.
@@ -242,12 +306,12 @@ impl Layer {
         }
     }
 
-    /// Number of the bin, of layers that every bin has.
+    /// Number of the bin that the layer belongs to, if any.
     pub fn bin_number(self) -> Option<u8> {
         self.bin().map(|(_, number)| number)
     }
 
-    /// Row of [`BINNED`] and number of the bin.
+    /// Row of [`BINNED`] and number of the bin, if the layer belongs to one.
     fn bin(self) -> Option<(usize, u8)> {
         match self {
             Self::BinColor(k) => Some((0, k)),
@@ -260,7 +324,7 @@ impl Layer {
         }
     }
 
-    /// The layer's row of the table; of a binned layer without its number.
+    /// The layer's row of the table; its name lacks the number of the bin.
     pub fn info(self) -> Info {
         match self.bin() {
             Some((which, _)) => BINNED[which],

@@ -1,234 +1,37 @@
-//! What rendering leaves behind: running statistics per pixel ([`Film`]), developed into means and variances
-//! ([`Frame`]), which reconstructions see and EXR files hold.
+//! The result of rendering: running statistics per pixel ([`Film`]), developed into means and variances ([`Frame`]),
+//! which reconstructions see and EXR files hold.
+//!
+//! ```text
+//! Sample --add--> Tile (table of statistics) --develop--> Frame (table of layers) --edges--> Edges
+//! ```
 
 mod develop;
+mod edges;
 pub mod exr;
 mod frame;
 pub mod layer;
+mod needs;
+mod provenance;
 mod sample;
+mod source;
+mod statistic;
 mod stored;
+mod tile;
 
-use serde::{Deserialize, Serialize};
-
-pub use self::frame::Frame;
+pub use self::edges::{Cross, EdgeParts, Edges, HalfEdge};
+pub use self::frame::{Frame, half};
 pub use self::layer::Layer;
-use self::sample::Moments;
-pub use self::sample::{EDGES, Features, Rejected, Sample, bin_count};
-use crate::math::Rgb;
+pub use self::needs::{EdgeNeed, Needs};
+pub use self::provenance::Provenance;
+pub use self::sample::{CROSS, Differences, Features, Rejected, Sample};
+pub use self::statistic::bin_count;
+pub use self::tile::Tile;
 
-/// Samples are dealt in turn to this many groups, whose statistics are independent of each other.
+/// Number of disjoint groups of samples, with means of their own: sample i of a pixel belongs to bin i mod 8.
 pub const BINS: usize = 8;
 
-/// Side of the square tiles that a film is worked on in.
+/// Side of the square tiles that a film is rendered in.
 pub const TILE: usize = 16;
-
-/// What a method wants recorded besides colour.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Needs {
-    /// Albedo, normal and depth with their variances.
-    pub features: bool,
-    /// Differences to the neighbours with their variances.
-    pub edges: bool,
-    /// Colour and edges for each of the [`BINS`].
-    pub bins: bool,
-    /// Ambient occlusion with its variance.
-    pub occlusion: bool,
-    /// World position with its variance.
-    pub position: bool,
-    /// Bins of what an ambient light would add.
-    pub ambient: bool,
-}
-
-impl Needs {
-    /// Everything.
-    pub const ALL: Self =
-        Self { features: true, edges: true, bins: true, occlusion: true, position: true, ambient: true };
-
-    /// Bytes that a film takes a pixel, as long as the camera sees no emitter; 24 more where it does.
-    pub fn bytes_per_pixel(self) -> usize {
-        let when = |needed: bool, bytes: usize| if needed { bytes } else { 0 };
-        size_of::<u32>()
-            + size_of::<Moments<3>>()
-            + when(self.features, size_of::<Moments<7>>())
-            + when(self.occlusion || self.position, size_of::<Moments<4>>())
-            + when(self.edges, size_of::<Moments<12>>())
-            + when(self.bins, size_of::<[Bin; BINS]>())
-            + when(self.ambient, size_of::<[Bin; BINS]>())
-    }
-
-    /// Whether everything that `other` wants is there.
-    pub fn cover(self, other: Self) -> bool {
-        self.union(other) == self
-    }
-
-    /// What either wants.
-    pub fn union(self, other: Self) -> Self {
-        Self {
-            features: self.features || other.features,
-            edges: self.edges || other.edges,
-            bins: self.bins || other.bins,
-            occlusion: self.occlusion || other.occlusion,
-            position: self.position || other.position,
-            ambient: self.ambient || other.ambient,
-        }
-    }
-}
-
-/// Colour and edges, in the order of [`EDGES`]: of a sample, or the means of a bin.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Bin {
-    /// Radiance.
-    pub color: Rgb,
-    /// One end's share of the differences neighbour minus pixel.
-    pub edges: [Rgb; 4],
-}
-
-impl Bin {
-    /// Takes in other means, which make up `share` of both.
-    fn add(&mut self, other: &Self, share: f32) {
-        self.color += (other.color - self.color) * share;
-        let edges = self.edges.iter_mut().zip(other.edges);
-        edges.for_each(|(mean, edge)| *mean += (edge - *mean) * share);
-    }
-}
-
-/// The statistics of a tile's pixels, row by row. A tile has one writer at a time, so nothing is locked.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Tile {
-    /// Left column in the film.
-    pub x: usize,
-    /// Top row in the film.
-    pub y: usize,
-    /// Columns.
-    pub width: usize,
-    /// Rows.
-    pub height: usize,
-    counts: Vec<u32>,
-    /// Empty until there is one.
-    rejected: Vec<u32>,
-    color: Vec<Moments<3>>,
-    /// Empty until the camera sees an emitter.
-    direct: Vec<Moments<3>>,
-    /// Albedo, normal and depth; empty when not needed.
-    features: Vec<Moments<7>>,
-    /// Occlusion and position; empty when neither is needed.
-    places: Vec<Moments<4>>,
-    /// Empty when not needed.
-    edges: Vec<Moments<12>>,
-    /// Empty when not needed.
-    bins: Vec<[Bin; BINS]>,
-    /// Those of the ambient light; empty when not needed.
-    ambient: Vec<[Bin; BINS]>,
-}
-
-impl Tile {
-    fn new(x: usize, y: usize, width: usize, height: usize, needs: Needs) -> Self {
-        let pixels = width * height;
-        let when = |needed: bool| if needed { pixels } else { 0 };
-        Self {
-            x,
-            y,
-            width,
-            height,
-            counts: vec![0; pixels],
-            rejected: Vec::new(),
-            color: vec![Moments::default(); pixels],
-            direct: Vec::new(),
-            features: vec![Moments::default(); when(needs.features)],
-            places: vec![Moments::default(); when(needs.occlusion || needs.position)],
-            edges: vec![Moments::default(); when(needs.edges)],
-            bins: vec![[Bin::default(); BINS]; when(needs.bins)],
-            ambient: vec![[Bin::default(); BINS]; when(needs.ambient)],
-        }
-    }
-
-    /// Number of samples pixel `index` has, and so the number of its next sample.
-    pub fn count(&self, index: usize) -> u32 {
-        self.counts[index]
-    }
-
-    /// Samples of all pixels.
-    pub fn samples(&self) -> u64 {
-        self.counts.iter().map(|&count| u64::from(count)).sum()
-    }
-
-    /// Adds a sample to pixel `index`. One that is not finite is counted as zero, and reported.
-    pub fn add(&mut self, index: usize, sample: &Sample) -> Result<(), Rejected> {
-        let (sample, outcome) = match sample.check() {
-            Ok(()) => (*sample, Ok(())),
-            Err(reason) => {
-                self.rejected.resize(self.counts.len(), 0);
-                self.rejected[index] += 1;
-                (Sample::default(), Err(reason))
-            }
-        };
-        let bin = self.counts[index] as usize % BINS;
-        let bin_share = 1.0 / (self.counts[index] as usize / BINS + 1) as f32;
-        self.counts[index] += 1;
-        let share = 1.0 / self.counts[index] as f32;
-        self.color[index].add(sample.color.to_array(), share);
-        if self.direct.is_empty() && sample.direct != Rgb::ZERO {
-            self.direct.resize(self.counts.len(), Moments::default());
-        }
-        if let Some(direct) = self.direct.get_mut(index) {
-            direct.add(sample.direct.to_array(), share);
-        }
-        if let Some(features) = self.features.get_mut(index) {
-            features.add(sample.features.to_array(), share);
-        }
-        if let Some(places) = self.places.get_mut(index) {
-            places.add(sample.features.place(), share);
-        }
-        if let Some(edges) = self.edges.get_mut(index) {
-            edges.add(sample::flatten(&sample.edges), share);
-        }
-        if let Some(bins) = self.bins.get_mut(index) {
-            bins[bin].add(&Bin { color: sample.color, edges: sample.edges }, bin_share);
-        }
-        if let Some(bins) = self.ambient.get_mut(index) {
-            bins[bin].add(&sample.ambient, bin_share);
-        }
-        outcome
-    }
-
-    fn merge(&mut self, other: &Self) {
-        self.direct.resize(self.direct.len().max(other.direct.len()), Moments::default());
-        self.rejected.resize(self.rejected.len().max(other.rejected.len()), 0);
-        for index in 0..self.counts.len() {
-            let (n, m) = (self.counts[index], other.counts[index]);
-            if m == 0 {
-                continue;
-            }
-            let share = f64::from(m) / (f64::from(n) + f64::from(m));
-            self.color[index].merge(&other.color[index], n, share);
-            if let Some(direct) = self.direct.get_mut(index) {
-                direct.merge(other.direct.get(index).unwrap_or(&Moments::default()), n, share);
-            }
-            if let Some(features) = self.features.get_mut(index) {
-                features.merge(&other.features[index], n, share);
-            }
-            if let Some(places) = self.places.get_mut(index) {
-                places.merge(&other.places[index], n, share);
-            }
-            if let Some(edges) = self.edges.get_mut(index) {
-                edges.merge(&other.edges[index], n, share);
-            }
-            for (bins, theirs) in [(&mut self.bins, &other.bins), (&mut self.ambient, &other.ambient)] {
-                let Some(bins) = bins.get_mut(index) else { continue };
-                // Their samples come after ours: the first of them is in the bin that is next.
-                for (k, theirs) in theirs[index].iter().enumerate() {
-                    let to = (n as usize + k) % BINS;
-                    let (a, b) = (f64::from(sample::bin_count(n, to)), f64::from(sample::bin_count(m, k)));
-                    bins[to].add(theirs, if b > 0.0 { (b / (a + b)) as f32 } else { 0.0 });
-                }
-            }
-            self.counts[index] = n + m;
-            if let Some(rejected) = self.rejected.get_mut(index) {
-                *rejected += other.rejected.get(index).copied().unwrap_or_default();
-            }
-        }
-    }
-}
 
 /// Running statistics of every pixel, in tiles.
 #[derive(Clone, Debug, PartialEq)]
@@ -248,13 +51,13 @@ impl Film {
         let mut tiles = Vec::new();
         for y in (0..height).step_by(TILE) {
             for x in (0..width).step_by(TILE) {
-                tiles.push(Tile::new(x, y, TILE.min(width - x), TILE.min(height - y), needs));
+                tiles.push(Tile::new((x, y), (TILE.min(width - x), TILE.min(height - y)), needs));
             }
         }
         Self { width, height, needs, tiles }
     }
 
-    /// All tiles, to be worked on by different threads.
+    /// All tiles, to be rendered by different threads.
     pub fn tiles_mut(&mut self) -> &mut [Tile] {
         &mut self.tiles
     }
@@ -285,6 +88,11 @@ impl Film {
         self.tiles.iter().flat_map(|tile| &tile.counts).copied().max().unwrap_or(0)
     }
 
+    /// Mean number of samples of a pixel.
+    pub fn mean_spp(&self) -> f64 {
+        self.samples() as f64 / (self.width * self.height) as f64
+    }
+
     /// Samples that were not finite.
     pub fn rejected(&self) -> u64 {
         self.tiles.iter().flat_map(|tile| &tile.rejected).map(|&count| u64::from(count)).sum()
@@ -300,7 +108,7 @@ impl Film {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::{Vec3, vec3};
+    use crate::math::{Rgb, Vec3, vec3};
 
     fn sample(i: u32) -> Sample {
         let value = (i as f32 * 0.7).sin() + 1.5;
@@ -311,8 +119,9 @@ mod tests {
             occlusion: 0.5 * value,
             position: Vec3::splat(value),
         };
-        let ambient = Bin { color: Rgb::splat(value), edges: [Rgb::splat(value); 4] };
-        Sample { color: vec3(value, 2.0, 0.0), direct: Rgb::ONE, features, edges: [Rgb::splat(value); 4], ambient }
+        let edges = [Rgb::splat(value); 4];
+        let differences = Some(Differences { color: edges, ambient: edges });
+        Sample { color: vec3(value, 2.0, 0.0), direct: Rgb::ONE, features, ambient: Rgb::splat(value), differences }
     }
 
     #[test]
@@ -328,10 +137,7 @@ mod tests {
         // Constant channels have no variance at all, not a rounded one.
         assert_eq!(frame.get(Layer::ColorVariance).unwrap().data[1..], [0.0, 0.0]);
         let bins: f64 = (0..8)
-            .map(|b| {
-                f64::from(frame.get(Layer::BinColor(b)).unwrap().data[0])
-                    * f64::from(sample::bin_count(100, b as usize))
-            })
+            .map(|b| f64::from(frame.get(Layer::BinColor(b)).unwrap().data[0]) * f64::from(bin_count(100, b as usize)))
             .sum::<f64>()
             / 100.0;
         assert!((bins - mean).abs() < 1e-6);
@@ -348,8 +154,9 @@ mod tests {
         let [mut merged, second] = halves;
         merged.merge(&second);
         let (a, b) = (merged.develop(), whole.develop());
-        for layer in Layer::all() {
-            let (a, b) = (a.get(layer).unwrap(), b.get(layer).unwrap());
+        assert_eq!(a.present().count(), Layer::COUNT - 1);
+        for (layer, a) in a.present() {
+            let b = b.get(layer).unwrap();
             a.data.iter().zip(&b.data).for_each(|(a, b)| assert!((a - b).abs() < 1e-5, "{layer:?}: {a} {b}"));
         }
     }
@@ -362,5 +169,45 @@ mod tests {
         film.tiles_mut()[0].add(1, &Sample { color: Rgb::ONE, ..sample(0) }).unwrap();
         assert_eq!((film.rejected(), film.samples()), (1, 2));
         assert_eq!(film.develop().get(Layer::Color).unwrap().pixel(1, 0), [0.5; 3]);
+    }
+
+    #[test]
+    fn edges_that_are_sampled_less_often_have_counts_of_their_own() {
+        let (mut film, mut dense) = (Film::new(2, 1, Needs::ALL), Film::new(2, 1, Needs::ALL));
+        for (i, pixel) in (0..32).flat_map(|i| [(i, 0), (i, 1)]) {
+            let differences = sample(i).differences.filter(|_| i % 4 == 1);
+            film.tiles_mut()[0].add(pixel, &Sample { differences, ..sample(i) }).unwrap();
+            if i % 4 == 1 {
+                dense.tiles_mut()[0].add(pixel, &sample(i)).unwrap();
+            }
+        }
+        assert_eq!((film.tiles_mut()[0].count(0), film.tiles_mut()[0].edge_count(0)), (32, 8));
+        let mut bytes = Vec::new();
+        film.write(&mut bytes).unwrap();
+        assert_eq!(Film::read((2, 1), Needs::ALL, &mut bytes.as_slice()).unwrap(), film);
+        // The edges are those of the samples that had differences, as if there had been no others.
+        let (frame, dense) = (film.develop(), dense.develop());
+        for layer in [Layer::Dx, Layer::DxVariance, Layer::BinDx(3), Layer::BinAmbientDx(7)] {
+            assert_eq!(frame.get(layer), dense.get(layer), "{layer:?}");
+        }
+        assert_eq!(frame.get(Layer::EdgeSamples).unwrap().data, [8.0; 2]);
+        assert_eq!(dense.get(Layer::EdgeSamples), None);
+        let mut twice = film.clone();
+        twice.merge(&film);
+        assert_eq!(twice.develop().get(Layer::EdgeSamples).unwrap().data, [16.0; 2]);
+        assert_eq!(twice.develop().get(Layer::Dx), frame.get(Layer::Dx));
+    }
+
+    #[test]
+    fn known_zeros_are_developed_without_being_recorded() {
+        let mut film = Film::new(3, 2, Needs { edges: EdgeNeed::KnownZero, ..Needs::ALL });
+        film.tiles_mut()[0].add(0, &Sample { differences: None, ..sample(1) }).unwrap();
+        let frame = film.develop();
+        for layer in [Layer::Dx, Layer::DyVariance, Layer::BinDx(2), Layer::BinAmbientDy(5)] {
+            assert!(frame.get(layer).unwrap().data.iter().all(|&value| value == 0.0), "{layer:?}");
+        }
+        assert!(film.needs.bytes_per_pixel() < Needs::ALL.bytes_per_pixel());
+        assert!(film.needs.cover(Needs { edges: EdgeNeed::KnownZero, ..Needs::default() }));
+        assert!(!film.needs.cover(Needs::EDGES));
     }
 }

@@ -1,39 +1,43 @@
-//! What one camera path leaves behind, and the running moments it is added to.
+//! The result of one camera path and of its shifted copies.
 
-use super::{BINS, Bin};
 use crate::math::{Rgb, Vec3};
 
-/// The neighbours that differences are taken to, as steps in x and y. Each edge is sampled from both ends.
-pub const EDGES: [(i32, i32); 4] = [(1, 0), (-1, 0), (0, 1), (0, -1)];
+/// The neighbours that a pixel's paths are shifted to, as steps in x and y. Each edge is sampled from both of its ends.
+pub const CROSS: [(i32, i32); 4] = [(1, 0), (-1, 0), (0, 1), (0, -1)];
 
-/// Auxiliary values at the first surface that is not a mirror or clear glass.
+/// Auxiliary values at the first surface on the camera path that has a non-delta lobe.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Features {
-    /// Colour of the material, in [0, 1].
+    /// Albedo of the material, in [0, 1].
     pub albedo: Rgb,
-    /// Shading normal in world space, towards the viewer.
+    /// Shading normal in world space, on the viewer's side.
     pub normal: Vec3,
-    /// Length of the path so far, in scene units.
+    /// Length of the path from the camera, in scene units.
     pub depth: f32,
-    /// Ambient occlusion: 1 where a direction from there was open, 0 where it was not.
+    /// Ambient occlusion sample: 1 if a cosine-distributed direction is unoccluded, 0 otherwise.
     pub occlusion: f32,
-    /// The point, in world space.
+    /// World position of the surface point.
     pub position: Vec3,
 }
 
 impl Features {
-    pub(super) fn to_array(self) -> [f32; 7] {
+    /// Albedo, normal and depth as one vector.
+    pub(super) fn surface(self) -> [f32; 7] {
         let (a, n) = (self.albedo, self.normal);
         [a.x, a.y, a.z, n.x, n.y, n.z, self.depth]
     }
-
-    pub(super) fn place(self) -> [f32; 4] {
-        let p = self.position;
-        [self.occlusion, p.x, p.y, p.z]
-    }
 }
 
-/// The result of one camera path and its shifted copies.
+/// One end's share of the differences "neighbour minus pixel", in the order of [`CROSS`]; zero across the film's border.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Differences {
+    /// Differences of the scattered radiance.
+    pub color: [Rgb; 4],
+    /// Differences of the radiance that an ambient light would add.
+    pub ambient: [Rgb; 4],
+}
+
+/// The result of one camera path and of its shifted copies.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sample {
     /// Scattered radiance: an unbiased estimate of the pixel without `direct`.
@@ -42,100 +46,65 @@ pub struct Sample {
     pub direct: Rgb,
     /// Auxiliary values.
     pub features: Features,
-    /// One end's share of the difference neighbour minus pixel, in the order of [`EDGES`]; zero across the
-    /// image's border.
-    pub edges: [Rgb; 4],
-    /// What an ambient light of radiance one, which nothing blocks, would add to the colour and the edges.
-    pub ambient: Bin,
+    /// Radiance that an unoccluded ambient light of radiance one would add to the colour.
+    pub ambient: Rgb,
+    /// Differences to the neighbours; `None` if the path was not shifted, which leaves the edges' counts alone.
+    pub differences: Option<Differences>,
 }
 
-/// Why a sample was not taken.
+/// The reason for dropping a sample: the part of it that is not finite, or too large to be squared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rejected(
-    /// Which part of it was not finite.
+    /// Name of that part.
     pub &'static str,
 );
 
 impl Rejected {
     const PARTS: [&'static str; 5] = ["color", "direct", "features", "ambient light", "edges"];
 
-    /// The reason of a name.
+    /// The reason with a given name, as read from a file.
     pub fn named(name: &str) -> Self {
         Self(Self::PARTS.into_iter().find(|part| *part == name).unwrap_or("something in them"))
     }
 }
 
-/// Values beyond this have squares whose sum over a million samples is no longer a float.
+/// Largest magnitude that is accepted: the sum of a million squares of it still fits into a float.
 const LARGEST: f32 = 1e16;
 
 impl Sample {
-    /// Fails on what is no number, and on numbers that would make the variance none.
+    /// Fails on NaN, on infinities and on values whose variance would overflow.
     pub(super) fn check(&self) -> Result<(), Rejected> {
-        let finite = |ok: bool, what| if ok { Ok(()) } else { Err(Rejected(what)) };
+        let finite = |ok: bool, part| if ok { Ok(()) } else { Err(Rejected(part)) };
         let value = |value: f32| value.abs() <= LARGEST;
         let color = |color: &Rgb| color.abs().max_element() <= LARGEST && !color.is_nan();
+        let differences = self.differences.unwrap_or_default();
         finite(color(&self.color), "color")?;
         finite(color(&self.direct), "direct")?;
-        let mut features = self.features.to_array().into_iter().chain(self.features.place());
+        let Features { occlusion, position, .. } = self.features;
+        let mut features = self.features.surface().into_iter().chain([occlusion]).chain(position.to_array());
         finite(features.all(value), "features")?;
-        finite(color(&self.ambient.color) && self.ambient.edges.iter().all(color), "ambient light")?;
-        finite(self.edges.iter().all(color), "edges")
+        finite(color(&self.ambient) && differences.ambient.iter().all(color), "ambient light")?;
+        finite(differences.color.iter().all(color), "edges")
+    }
+
+    /// The sample that takes the place of a rejected one: zero, with as many differences.
+    pub(super) fn zeroed(&self) -> Self {
+        Self { differences: self.differences.map(|_| Differences::default()), ..Self::default() }
+    }
+
+    /// Differences of the scattered radiance as one vector; zero if there are none.
+    pub(super) fn color_differences(&self) -> [f32; 12] {
+        flatten(&self.differences.unwrap_or_default().color)
+    }
+
+    /// Differences of the ambient light as one vector; zero if there are none.
+    pub(super) fn ambient_differences(&self) -> [f32; 12] {
+        flatten(&self.differences.unwrap_or_default().ambient)
     }
 }
 
-pub(super) fn flatten(edges: &[Rgb; 4]) -> [f32; 12] {
+fn flatten(edges: &[Rgb; 4]) -> [f32; 12] {
     let mut flat = [0.0; 12];
     flat.chunks_exact_mut(3).zip(edges).for_each(|(slot, edge)| slot.copy_from_slice(&edge.to_array()));
     flat
-}
-
-/// Samples in bin `k` of a pixel that has `n`.
-pub fn bin_count(n: u32, k: usize) -> u32 {
-    (n + (BINS - 1 - k) as u32) / BINS as u32
-}
-
-/// Running mean and sum of squared deviations (Welford 1962) of N values.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Moments<const N: usize> {
-    pub mean: [f32; N],
-    pub deviation: [f32; N],
-}
-
-impl<const N: usize> Default for Moments<N> {
-    fn default() -> Self {
-        Self { mean: [0.0; N], deviation: [0.0; N] }
-    }
-}
-
-impl<const N: usize> Moments<N> {
-    /// Adds a sample; `share` is one over the count with it.
-    #[inline]
-    pub fn add(&mut self, values: [f32; N], share: f32) {
-        for ((mean, deviation), value) in self.mean.iter_mut().zip(&mut self.deviation).zip(values) {
-            let before = value - *mean;
-            *mean += before * share;
-            *deviation += before * (value - *mean);
-        }
-    }
-
-    /// Adds another group that makes up `share` of both together; this one has `n` samples (Chan et al. 1979).
-    pub fn merge(&mut self, other: &Self, n: u32, share: f64) {
-        for i in 0..N {
-            let (mean, deviation) = (f64::from(self.mean[i]), f64::from(self.deviation[i]));
-            let apart = f64::from(other.mean[i]) - mean;
-            self.mean[i] = (mean + apart * share) as f32;
-            let between = apart * apart * f64::from(n) * share;
-            self.deviation[i] = (deviation + f64::from(other.deviation[i]) + between) as f32;
-        }
-    }
-
-    /// Variance of the mean of `n` samples. A single sample says nothing of its variance: it gets its own
-    /// square, rather than a certainty of zero.
-    pub fn variance_of_mean(&self, i: usize, n: u32) -> f32 {
-        match n {
-            0 => 0.0,
-            1 => self.mean[i] * self.mean[i],
-            _ => (f64::from(self.deviation[i]) / (f64::from(n) * f64::from(n - 1))).max(0.0) as f32,
-        }
-    }
 }

@@ -20,5 +20,5 @@ pub fn denoise(color: &Image, albedo: &Image, normal: &Image, clean: bool) -> Re
         };
         Ok(Image { data, ..Image::new(size.0, size.1, 3) })
     };
-    run().map_err(|what: String| Error::Usage(format!("open image denoise: {what}")))
+    run().map_err(|what: String| Error::backend("open image denoise", what))
 }

@@ -35,11 +35,11 @@ pub const METRICS: &[Metric] = &[rel_mse::METRIC, smape::METRIC, flip::METRIC, m
 pub fn check(image: &Image, reference: &Image) -> Result<()> {
     if image.shape() != reference.shape() || image.channels != 3 || image.is_empty() {
         let text = |image: &Image| format!("{}x{} pixels of {} channels", image.width, image.height, image.channels);
-        return Err(Error::Usage(format!("the images differ in shape: {} and {}", text(image), text(reference))));
+        return Err(Error::Mismatch(format!("the images differ in shape: {} and {}", text(image), text(reference))));
     }
     for (name, image) in [("image", image), ("reference", reference)] {
         if let Some((x, y, _)) = image.not_finite() {
-            return Err(Error::Usage(format!("the {name} is not finite at pixel {x},{y}")));
+            return Err(Error::BadData(format!("the {name} is not finite at pixel {x},{y}")));
         }
     }
     Ok(())

@@ -4,18 +4,21 @@
 
 use rayon::prelude::*;
 
+use super::edge_means::{self, Missing};
 use super::inputs::{Inputs, check_memory};
-use super::{Context, Method, Parameter, Parameters, Reconstruction, Solution};
+use super::{Context, Method, Parameter, Parameters, Reconstruction, Solution, Traits};
 use crate::error::{Error, Result};
-use crate::film::{Frame, Layer, Needs};
+use crate::film::{EdgeParts, Edges, Frame, HalfEdge, Layer, Needs, half};
 use crate::image::Image;
 use crate::image::planes::Planes;
+use crate::math::{Rgb, vec3};
 use crate::solve::graph::Quad;
 
 /// `control_variate`.
 pub const METHOD: Method = Method {
     id: "control_variate",
     summary: "repeated means of each pixel with its neighbours plus the sampled differences",
+    traits: Traits { robust: true, ..Traits::POISSON },
     parameters: &[
         Parameter {
             name: "iterations",
@@ -25,7 +28,7 @@ pub const METHOD: Method = Method {
         Parameter {
             name: "weights",
             default: "variance",
-            summary: "of the mean: `uniform`, unbiased, or by inverse `variance`",
+            summary: "of the mean: `uniform`, unbiased; by inverse `variance`; or `given` with the frame's edges",
         },
         Parameter {
             name: "cross",
@@ -39,6 +42,8 @@ pub const METHOD: Method = Method {
 #[derive(Clone, Copy, PartialEq)]
 enum Weighting {
     Uniform,
+    /// By weights that come with the edges.
+    Given,
     /// By the variances of all samples.
     Variance,
     /// Each half by the variances of the other one.
@@ -49,9 +54,10 @@ enum Weighting {
 const BYTES: u64 = 250;
 
 fn make(parameters: &Parameters) -> Result<Box<dyn Reconstruction>> {
-    let uniform = parameters.choice("weights", &["uniform", "variance"])? == "uniform";
-    let weighting = match (uniform, parameters.switch("cross")?) {
-        (true, _) => Weighting::Uniform,
+    let weights = parameters.choice("weights", &["uniform", "variance", "given"])?;
+    let weighting = match (weights.as_str(), parameters.switch("cross")?) {
+        ("uniform", _) => Weighting::Uniform,
+        ("given", _) => Weighting::Given,
         (_, true) => Weighting::Cross,
         _ => Weighting::Variance,
     };
@@ -66,23 +72,32 @@ struct ControlVariate {
 
 impl Reconstruction for ControlVariate {
     fn needs(&self) -> Needs {
-        Needs { edges: true, bins: self.weighting == Weighting::Cross, ..Needs::default() }
+        Needs { bins: self.weighting == Weighting::Cross, ..Needs::EDGES }
     }
 
     fn reconstruct(&self, frame: &Frame, context: &Context) -> Result<Solution> {
         let inputs = Inputs::new(frame, 1)?;
         check_memory(frame, context, METHOD.id, BYTES)?;
-        let all = || Estimate::of_all(&inputs);
+        let edges = frame.edges(EdgeParts {
+            variance: self.weighting == Weighting::Variance,
+            bins: self.weighting == Weighting::Cross,
+            ..EdgeParts::default()
+        })?;
         let solution = match self.weighting {
-            Weighting::Uniform => Shares::uniform(frame).apply(&all()?, self.iterations),
+            Weighting::Uniform => {
+                Stencil::new(&edges, |_, _| 1.0).apply(&edges, &Estimate::unweighted(&inputs, &edges)?, self.iterations)
+            }
+            Weighting::Given => {
+                Stencil::given(&edges)?.apply(&edges, &Estimate::unweighted(&inputs, &edges)?, self.iterations)
+            }
             Weighting::Variance => {
-                let all = all()?;
-                Shares::by_variance(frame, &all).apply(&all, self.iterations)
+                let all = Estimate::of_all(&inputs, &edges)?;
+                Stencil::by_variance(&edges, &all).apply(&edges, &all, self.iterations)
             }
             Weighting::Cross => {
-                let halves = [Estimate::of_half(&inputs, 0)?, Estimate::of_half(&inputs, 1)?];
-                let [a, b] =
-                    [0, 1].map(|k| Shares::by_variance(frame, &halves[1 - k]).apply(&halves[k], self.iterations));
+                let halves = [Estimate::of_half(&inputs, &edges, 0)?, Estimate::of_half(&inputs, &edges, 1)?];
+                let [a, b] = [0, 1]
+                    .map(|k| Stencil::by_variance(&edges, &halves[1 - k]).apply(&edges, &halves[k], self.iterations));
                 a.iter().zip(&b).map(|(a, b)| std::array::from_fn(|c| 0.5 * (a[c] + b[c]))).collect()
             }
         };
@@ -90,132 +105,138 @@ impl Reconstruction for ControlVariate {
     }
 }
 
-/// Colour, or differences along an axis, with the variance of the mean, mean over the channels.
+/// Colours and differences, and the variances of both, means over the channels; times the scale of the inputs.
 struct Estimate {
-    value: Vec<Quad>,
-    variance: Vec<f32>,
+    color: Vec<Quad>,
+    differences: Vec<Quad>,
+    color_variance: Vec<f32>,
+    edge_variance: Vec<f32>,
 }
 
-/// Radius of the squares that variances are averaged over: a pixel's own one goes with its value, and weights by it
-/// would favour what is too dark.
+/// Radius of the squares that variances are averaged over: a pixel's own variance is correlated with its value, and
+/// weights by it would favour values that are too dark.
 const SMOOTHING: usize = 2;
 
 impl Estimate {
-    /// `edge` is the step from a pixel to the next of the differences, and zero for colours.
-    fn new(inputs: &Inputs, mean: &Image, variance: &Image, edge: (usize, usize)) -> Self {
+    /// All samples, without variances.
+    fn unweighted(inputs: &Inputs, edges: &Edges) -> Result<Self> {
+        let (color, differences) = (inputs.quads(Layer::Color)?, inputs.differences(edges));
+        Ok(Self { color, differences, color_variance: Vec::new(), edge_variance: Vec::new() })
+    }
+
+    /// All samples.
+    fn of_all(inputs: &Inputs, edges: &Edges) -> Result<Self> {
+        let [color, variance] = [Layer::Color, Layer::ColorVariance].map(|layer| inputs.frame.require(layer));
+        Ok(Self::new(inputs, edges, [color?, variance?], [&edges.mean, &edges.variance]))
+    }
+
+    /// Every other bin of the samples.
+    fn of_half(inputs: &Inputs, edges: &Edges, first: usize) -> Result<Self> {
+        let [color, variance] = inputs.frame.color_half(first)?;
+        let (mut means, mut variances) = (Vec::with_capacity(edges.len()), Vec::with_capacity(edges.len()));
+        for (bins, &count) in edges.bins.iter().zip(&edges.counts) {
+            let of_channel = |c: usize| half(bins.map(|bin| bin[c]), count, first);
+            let [r, g, b] = [of_channel(0), of_channel(1), of_channel(2)];
+            means.push(vec3(r.0, g.0, b.0));
+            variances.push(vec3(r.1, g.1, b.1));
+        }
+        Ok(Self::new(inputs, edges, [&color, &variance], [&means, &variances]))
+    }
+
+    /// From means and variances of colours and of edges, in radiance.
+    fn new(inputs: &Inputs, edges: &Edges, [color, variance]: [&Image; 2], of_edges: [&[Rgb]; 2]) -> Self {
         let scale = inputs.scale;
-        let value = |rgb: &[f32]| [rgb[0] * scale, rgb[1] * scale, rgb[2] * scale, 0.0];
-        let rgb = |x: usize, y: usize| variance.pixel(x, y).iter().map(|v| v * scale * scale / 3.0).sum();
-        // Beyond the last edge there is none: its variance stands there, for the means.
-        let last = (variance.width.saturating_sub(edge.0 + 1), variance.height.saturating_sub(edge.1 + 1));
-        let variance = Planes::from_fn(variance.width, variance.height, 1, |_, x, y| rgb(x.min(last.0), y.min(last.1)));
-        let variance = variance.box_mean(SMOOTHING).to_image(variance.width, variance.height, 1.0).data;
-        Self { value: mean.data.par_chunks_exact(3).map(value).collect(), variance }
-    }
-
-    /// Colour and differences to the right and downwards, of all samples.
-    fn of_all(inputs: &Inputs) -> Result<[Self; 3]> {
-        let of = |mean, variance, edge| {
-            let (mean, variance) = (inputs.frame.require(mean)?, inputs.frame.require(variance)?);
-            Ok::<_, Error>(Self::new(inputs, mean, variance, edge))
-        };
-        Ok([
-            of(Layer::Color, Layer::ColorVariance, (0, 0))?,
-            of(Layer::Dx, Layer::DxVariance, (1, 0))?,
-            of(Layer::Dy, Layer::DyVariance, (0, 1))?,
-        ])
-    }
-
-    /// The same of a half of the samples.
-    fn of_half(inputs: &Inputs, half: usize) -> Result<[Self; 3]> {
-        let of = |bin, edge| {
-            let [mean, variance] = inputs.frame.half(bin, half)?;
-            Ok::<_, Error>(Self::new(inputs, &mean, &variance, edge))
-        };
-        Ok([of(Layer::BinColor, (0, 0))?, of(Layer::BinDx, (1, 0))?, of(Layer::BinDy, (0, 1))?])
+        let (width, height) = (variance.width, variance.height);
+        let mean_of = |rgb: &[f32]| rgb.iter().map(|v| v * scale * scale / 3.0).sum::<f32>();
+        let of_color = Planes::from_fn(width, height, 1, |_, x, y| mean_of(variance.pixel(x, y)));
+        let of_edge: Vec<f32> = of_edges[1].par_iter().map(|variance| mean_of(&variance.to_array())).collect();
+        Self {
+            color: color.data.par_chunks_exact(3).map(|rgb| inputs.quad(vec3(rgb[0], rgb[1], rgb[2]))).collect(),
+            differences: of_edges[0].par_iter().map(|mean| inputs.quad(*mean)).collect(),
+            color_variance: of_color.box_mean(SMOOTHING).to_image(width, height, 1.0).data,
+            edge_variance: edge_means::box_mean(edges, (width, height), &of_edge, SMOOTHING, Missing::Nearest),
+        }
     }
 }
 
-/// A pixel's neighbours: along which axis, and whether it is the next or the one before.
-const NEIGHBOURS: [(usize, bool); 4] = [(0, true), (0, false), (1, true), (1, false)];
-
-/// Weights of pixels and their neighbours, which add up to one.
-struct Shares {
-    width: usize,
-    shares: Vec<[f32; 5]>,
+/// Every pixel's weights of itself and of its neighbours, which add up to one.
+struct Stencil {
+    own: Vec<f32>,
+    /// First entry of every pixel in `neighbours`, and the number of entries.
+    rows: Vec<u32>,
+    neighbours: Vec<(HalfEdge, f32)>,
 }
 
-impl Shares {
-    /// The neighbour of a pixel and the pixel whose difference leads there.
-    fn neighbour(width: usize, pixels: usize, i: usize, (axis, next): (usize, bool)) -> Option<(usize, usize)> {
-        let (step, inside) = match (axis, next) {
-            (0, true) => (1, !(i + 1).is_multiple_of(width)),
-            (0, false) => (1, !i.is_multiple_of(width)),
-            (_, true) => (width, i + width < pixels),
-            (_, false) => (width, i >= width),
-        };
-        inside.then(|| if next { (i + step, i) } else { (i - step, i - step) })
+impl Stencil {
+    /// Normalises the weights of every pixel (`None`) and of its neighbours.
+    fn new(edges: &Edges, weight: impl Fn(usize, Option<HalfEdge>) -> f32) -> Self {
+        let pixels = edges.pixels();
+        let (mut own, mut rows, mut neighbours) =
+            (Vec::with_capacity(pixels), vec![0], Vec::with_capacity(2 * edges.len()));
+        for pixel in 0..pixels {
+            let start = neighbours.len();
+            neighbours.extend(edges.around(pixel).map(|half| (half, weight(pixel, Some(half)))));
+            let row = &mut neighbours[start..];
+            row.sort_by_key(|(half, _)| (half.to.abs_diff(pixel), half.to < pixel));
+            let of_pixel = weight(pixel, None);
+            let total = row.iter().fold(of_pixel, |sum, (_, weight)| sum + weight);
+            row.iter_mut().for_each(|(_, weight)| *weight /= total);
+            own.push(of_pixel / total);
+            rows.push(neighbours.len() as u32);
+        }
+        Self { own, rows, neighbours }
     }
 
-    fn new(width: usize, pixels: usize, weight: impl Fn(usize, Option<(usize, usize, usize)>) -> f32 + Sync) -> Self {
-        let shares = (0..pixels).into_par_iter().map(|i| {
-            let mut shares = [weight(i, None), 0.0, 0.0, 0.0, 0.0];
-            for (share, at) in shares[1..].iter_mut().zip(NEIGHBOURS) {
-                if let Some((to, edge)) = Self::neighbour(width, pixels, i, at) {
-                    *share = weight(i, Some((to, at.0, edge)));
-                }
-            }
-            let total: f32 = shares.iter().sum();
-            shares.map(|share| share / total)
-        });
-        Self { width, shares: shares.collect() }
+    /// Weights that come with the edges, against one of the pixel itself.
+    fn given(edges: &Edges) -> Result<Self> {
+        if edges.weights.is_empty() && !edges.is_empty() {
+            return Err(Error::BadData("the frame's edges come without weights; take `weights=variance`".into()));
+        }
+        Ok(Self::new(edges, |_, half| half.map_or(1.0, |half| edges.weights[half.edge][usize::from(half.sign < 0.0)])))
     }
 
-    fn uniform(frame: &Frame) -> Self {
-        Self::new(frame.width, frame.width * frame.height, |_, _| 1.0)
-    }
-
-    /// By the inverse of the variance that each of the five has as an estimate of the pixel.
-    fn by_variance(frame: &Frame, [color, dx, dy]: &[Estimate; 3]) -> Self {
-        let least = 1e-12 + 1e-6 * color.variance.iter().sum::<f32>() / color.variance.len() as f32;
-        Self::new(frame.width, color.variance.len(), |i, neighbour| {
-            let variance = match neighbour {
-                None => color.variance[i],
-                Some((to, axis, edge)) => color.variance[to] + [dx, dy][axis].variance[edge],
+    /// Inverse of the variance that the pixel's own value and each corrected neighbour have as estimates of the pixel.
+    fn by_variance(edges: &Edges, estimate: &Estimate) -> Self {
+        let Estimate { color_variance, edge_variance, .. } = estimate;
+        let least = 1e-12 + 1e-6 * color_variance.iter().sum::<f32>() / color_variance.len() as f32;
+        Self::new(edges, |pixel, half| {
+            let variance = match half {
+                None => color_variance[pixel],
+                Some(half) => color_variance[half.to] + edge_variance[half.edge],
             };
             1.0 / (variance + least)
         })
     }
 
-    /// Replaces every pixel by the mean of the five, so many times.
-    fn apply(&self, [color, dx, dy]: &[Estimate; 3], iterations: u32) -> Vec<Quad> {
-        let pixels = self.shares.len();
-        // What the differences add is the same every time.
-        let correction = |i: usize| {
+    fn row(&self, pixel: usize) -> &[(HalfEdge, f32)] {
+        &self.neighbours[self.rows[pixel] as usize..self.rows[pixel + 1] as usize]
+    }
+
+    /// Replaces every pixel by the mean of itself and its corrected neighbours, so many times.
+    fn apply(&self, edges: &Edges, estimate: &Estimate, iterations: u32) -> Vec<Quad> {
+        debug_assert_eq!(edges.len(), estimate.differences.len());
+        // The sum of the differences is the same every time.
+        let correction = |pixel: usize| {
             let mut sum: Quad = [0.0; 4];
-            for (share, at) in self.shares[i][1..].iter().zip(NEIGHBOURS) {
-                if let Some((_, edge)) = Self::neighbour(self.width, pixels, i, at) {
-                    let share = if at.1 { -share } else { *share };
-                    (0..3).for_each(|c| sum[c] += share * [dx, dy][at.0].value[edge][c]);
-                }
+            for (half, weight) in self.row(pixel) {
+                let weight = -half.sign * weight;
+                (0..3).for_each(|c| sum[c] += weight * estimate.differences[half.edge][c]);
             }
             sum
         };
-        let corrections: Vec<Quad> = (0..pixels).into_par_iter().map(correction).collect();
-        let mean = |i: usize, from: &[Quad]| {
-            let mut sum = corrections[i];
-            (0..3).for_each(|c| sum[c] += self.shares[i][0] * from[i][c]);
-            for (share, at) in self.shares[i][1..].iter().zip(NEIGHBOURS) {
-                if let Some((to, _)) = Self::neighbour(self.width, pixels, i, at) {
-                    (0..3).for_each(|c| sum[c] += share * from[to][c]);
-                }
+        let corrections: Vec<Quad> = (0..self.own.len()).into_par_iter().map(correction).collect();
+        let mean = |pixel: usize, from: &[Quad]| {
+            let mut sum = corrections[pixel];
+            (0..3).for_each(|c| sum[c] += self.own[pixel] * from[pixel][c]);
+            for (half, weight) in self.row(pixel) {
+                (0..3).for_each(|c| sum[c] += weight * from[half.to][c]);
             }
             sum
         };
-        let mut image = color.value.clone();
+        let mut image = estimate.color.clone();
         let mut next = image.clone();
         for _ in 0..iterations {
-            next.par_iter_mut().enumerate().for_each(|(i, slot)| *slot = mean(i, &image));
+            next.par_iter_mut().enumerate().for_each(|(pixel, slot)| *slot = mean(pixel, &image));
             std::mem::swap(&mut image, &mut next);
         }
         image

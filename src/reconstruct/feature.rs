@@ -3,7 +3,7 @@
 
 use super::generated::{self, Options};
 use super::inputs::{Inputs, check_memory};
-use super::{Context, Method, Parameters, Reconstruction, Solution};
+use super::{Context, EdgeTrust, Method, Parameters, Reconstruction, Solution, Traits};
 use crate::error::Result;
 use crate::film::{Frame, Needs};
 use crate::image::planes::Planes;
@@ -12,6 +12,7 @@ use crate::image::planes::Planes;
 pub const METHOD: Method = Method {
     id: "feature",
     summary: "Poisson reconstruction weighted by variances, bagged and cleaned: what `apr` takes as a feature; consistent",
+    traits: Traits { robust: false, edges: EdgeTrust::ByVariance, ..Traits::FILTER },
     parameters: &[generated::ROUNDS, generated::SCREEN, generated::VARIANCES, generated::PREFILTER, generated::AMBIENT],
     make,
 };

@@ -1,24 +1,25 @@
 //! A feature made of the differences (Back et al. 2018): the image whose differences are the sampled ones, as far as
 //! they can be trusted. It has every edge that the image has, those of shadows and reflections too.
 //!
-//! Differences are weighted by one over their variance, and the groups of samples are drawn again and again with
-//! replacement; each draw is solved for (bagging). How far the solutions are apart is the feature's variance, by which
-//! non-local means clean what noise is left.
+//! Differences are weighted by their inverse variances, and the bins of samples are drawn again and again with
+//! replacement; each draw is solved for (bagging). The variance of the solutions is the feature's variance, by which
+//! filters remove the noise that is left.
 
 use rayon::prelude::*;
 
+use super::edge_means::{self, Missing};
 use super::features::{Feature, Kind};
 use super::inputs::Inputs;
 use super::{Parameter, Parameters};
 use crate::error::Result;
-use crate::film::{BINS, Layer, Needs, bin_count};
+use crate::film::{BINS, EdgeParts, Edges, Layer, Needs, bin_count};
 use crate::image::nl_means::{self, Guide, Guides, rdfc};
 use crate::image::planes::Planes;
 use crate::math::rng;
 use crate::solve::graph::Quad;
-use crate::solve::poisson::{Data, Weights};
+use crate::solve::poisson::{Targets, Weights};
 
-/// How the feature is made.
+/// Parameters of the feature.
 #[derive(Clone, Debug)]
 pub struct Options {
     rounds: u32,
@@ -29,16 +30,16 @@ pub struct Options {
     ambient: f32,
 }
 
-/// What differences are weighted by.
+/// The variances that differences are weighted by.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Variances {
     /// Of all samples, averaged over 3x3 pixels; the same in every round.
     Samples,
-    /// Of the groups that were drawn, pixel by pixel.
+    /// Of the bins that were drawn, pixel by pixel.
     Draws,
 }
 
-/// What cleans the feature.
+/// The filter that cleans the feature.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Prefilter {
     Off,
@@ -94,10 +95,10 @@ impl Options {
         })
     }
 
-    /// What must be rendered.
+    /// Statistics that the feature is made from.
     pub fn needs(&self) -> Needs {
         let features = self.prefilter == Prefilter::Rdfc;
-        Needs { features, edges: true, bins: true, ambient: self.ambient > 0.0, ..Needs::default() }
+        Needs { features, bins: true, ambient: self.ambient > 0.0, ..Needs::EDGES }
     }
 
     /// The same without albedo and normal.
@@ -107,25 +108,25 @@ impl Options {
     }
 }
 
-/// What variances are raised by, in units of the typical luminance squared.
+/// Constant that is added to variances, in squares of the typical luminance.
 const FLOOR: f32 = 1e-4;
 
-/// Least screening, which keeps the mean where it is.
+/// Least weight of the colour, which determines the mean.
 const PIN: f32 = 1e-5;
 
 /// Residuals of the first problem are brought down to this share.
 const TOLERANCE: f64 = 1e-3;
 
-/// Those of the rounds, which start at its solution and tell variances only: a step or two, which find about 0.6 of the
-/// variance. What it is multiplied by below accounts for that.
-const ROUGHLY: f64 = 0.5;
+/// Residuals of the rounds' problems are brought down to this share. They start at the first solution and serve the
+/// variance only: a step or two find about 0.6 of it, which [`CORRELATION`] and [`RESIDUAL_VARIANCE`] account for.
+const BAG_TOLERANCE: f64 = 0.5;
 
-/// Filters trust variances of solutions too much: errors of neighbouring pixels are alike, whose distances they average as
-/// if they were not.
+/// Factor of the feature's variance in its filter: errors of neighbouring pixels are correlated, and the filter averages
+/// their distances as if they were independent.
 const CORRELATION: f32 = 3.0;
 
-/// Share of the feature's variance that cleaning leaves, as measured.
-const LEFT: f32 = 0.7;
+/// Share of the feature's variance that is left after cleaning (measured).
+const RESIDUAL_VARIANCE: f32 = 0.7;
 
 /// The cleaned feature, in units of [`Inputs::scale`], and the variance it had before, sum over the channels.
 pub fn feature(inputs: &Inputs, options: &Options, progress: &dyn Fn(f32)) -> Result<[Planes; 2]> {
@@ -145,43 +146,44 @@ pub fn feature(inputs: &Inputs, options: &Options, progress: &dyn Fn(f32)) -> Re
     Ok([mean, variance])
 }
 
-/// Estimated squared error of an image that follows the cleaned feature, sum over the channels: what is left of the
-/// feature's variance, and `own`, the share of the colour's. Medians over 5x5 pixels leave out single ones that cleaning
-/// mends.
+/// Estimated squared error of an image that follows the cleaned feature, sum over the channels: the residual variance of
+/// the feature plus `own`, the share of the colour's variance. Medians over 5x5 pixels ignore single outliers, which
+/// cleaning removes.
 pub fn error(variance: &Planes, own: &Planes) -> Planes {
-    variance.zip(own, |variance, own| LEFT * variance + own).box_mean(1).median(2)
+    variance.zip(own, |variance, own| RESIDUAL_VARIANCE * variance + own).box_mean(1).median(2)
 }
 
 /// The feature and the variance of its mean, sum over the channels.
 fn bagged(inputs: &Inputs, options: &Options, progress: &dyn Fn(f32)) -> Result<Guide> {
     let (width, height) = (inputs.frame.width, inputs.frame.height);
-    let groups = Groups::of(inputs, options.ambient)?;
-    let (all, of_draw) = groups.draw(&[[1; BINS]; 3], true);
-    // The ambient light's variances are only known from groups.
+    // The ambient light's variances are only known from its bins.
     let by_samples = options.variances == Variances::Samples && options.ambient == 0.0;
-    let variances = if by_samples { of_samples(inputs)? } else { of_draw };
+    let parts = EdgeParts { variance: by_samples, bins: true, ambient: options.ambient > 0.0 };
+    let edges = inputs.frame.edges(parts)?;
+    let groups = Groups::new(inputs, &edges, options.ambient)?;
+    let Drawn { color, differences, variances: of_draw } = groups.draw(None, true);
+    let variances = if by_samples { of_samples(inputs, &edges)? } else { of_draw };
     let smooth = options.variances == Variances::Samples;
-    let variances = if smooth { variances.map(|variances| averaged(variances, (width, height))) } else { variances };
-    let mut weights = weights(&variances, options.screen);
-    let mut solver = weights.solver(width);
-    let [color, dx, dy] = all;
-    let right = weights.right(Data { width, data: &color, edges: [&dx, &dy] });
-    let whole = solver.solve(&right, color, TOLERANCE).x;
+    let variances = if smooth { variances.averaged(&edges, (width, height)) } else { variances };
+    let mut weights = variances.weights(options.screen);
+    let mut solver = weights.solver(&edges);
+    let rhs = weights.rhs(Targets { edges: &edges, data: &color, differences: &differences });
+    let whole = solver.solve(&rhs, color, TOLERANCE).x;
     let mut sums: Vec<Quad> = vec![[0.0; 4]; whole.len()];
     for round in 0..options.rounds {
         let reweighs = options.variances == Variances::Draws;
-        let ([color, dx, dy], variances) = groups.draw(&[0, 1, 2].map(|which| draw(round, which)), reweighs);
+        let Drawn { color, differences, variances } = groups.draw(Some(round), reweighs);
         if reweighs {
-            weights = self::weights(&variances, options.screen);
-            solver.replace(weights.graph(width));
+            weights = variances.weights(options.screen);
+            solver.replace(weights.graph(&edges));
         }
-        let right = weights.right(Data { width, data: &color, edges: [&dx, &dy] });
-        let solution = solver.solve(&right, whole.clone(), ROUGHLY).x;
-        // How far it is off, with the squares of that in the fourth place.
+        let rhs = weights.rhs(Targets { edges: &edges, data: &color, differences: &differences });
+        let solution = solver.solve(&rhs, whole.clone(), BAG_TOLERANCE).x;
+        // Sums of the deviations, and of their squares over all channels in the fourth place.
         sums.par_iter_mut().zip(&solution).zip(&whole).for_each(|((sum, solution), whole)| {
-            let off = [0, 1, 2].map(|c| solution[c] - whole[c]);
-            (0..3).for_each(|c| sum[c] += off[c]);
-            sum[3] += off.iter().map(|off| off * off).sum::<f32>();
+            let deviation = [0, 1, 2].map(|c| solution[c] - whole[c]);
+            (0..3).for_each(|c| sum[c] += deviation[c]);
+            sum[3] += deviation.iter().map(|deviation| deviation * deviation).sum::<f32>();
         });
         progress((round + 1) as f32 / options.rounds as f32);
     }
@@ -189,7 +191,7 @@ fn bagged(inputs: &Inputs, options: &Options, progress: &dyn Fn(f32)) -> Result<
     // With the same weights in all rounds their mean is the solution of all samples, and some noise.
     let share = if options.variances == Variances::Draws { 1.0 / rounds } else { 0.0 };
     let mean = Planes::from_fn(width, height, 3, |c, x, y| whole[y * width + x][c] + share * sums[y * width + x][c]);
-    // Draws of n out of n vary by n - 1 of n parts of what samples do.
+    // Draws of n out of n with replacement have (n - 1) / n of the variance of the samples.
     let scale = BINS as f32 / (BINS as f32 - 1.0) / (rounds - 1.0);
     let variance = Planes::from_fn(width, height, 1, |_, x, y| {
         let [r, g, b, squares] = sums[y * width + x];
@@ -198,33 +200,44 @@ fn bagged(inputs: &Inputs, options: &Options, progress: &dyn Fn(f32)) -> Result<
     Ok(Guide { mean, variance, tolerance: None })
 }
 
-/// Weights of colour and differences with these variances.
-fn weights([color, dx, dy]: &[Vec<f32>; 3], screen: f32) -> Weights {
-    let weigh = |variances: &[f32], weight: f32| variances.par_iter().map(|v| weight / (v + FLOOR)).collect();
-    Weights { across: weigh(dx, 1.0), down: weigh(dy, 1.0), screen: weigh(color, screen.max(PIN)) }
+/// Variances of colours and of differences, sums over the channels.
+struct EstimateVariances {
+    color: Vec<f32>,
+    edges: Vec<f32>,
 }
 
-/// Variances of colour and differences, sums over the channels.
-fn of_samples(inputs: &Inputs) -> Result<[Vec<f32>; 3]> {
-    let sum = |layer| {
-        let quads = inputs.quads(layer)?;
-        Ok(quads.par_iter().map(|[r, g, b, _]| (r + g + b) * inputs.scale).collect())
-    };
-    Ok([sum(Layer::ColorVariance)?, sum(Layer::DxVariance)?, sum(Layer::DyVariance)?])
+impl EstimateVariances {
+    /// Weights by inverse variances.
+    fn weights(&self, screen: f32) -> Weights {
+        let weigh = |variances: &[f32], weight: f32| variances.par_iter().map(|v| weight / (v + FLOOR)).collect();
+        Weights { edges: weigh(&self.edges, 1.0), screen: weigh(&self.color, screen.max(PIN)) }
+    }
+
+    /// Means over 3x3 pixels: variances of single pixels are small where outliers happen to be missing, and are
+    /// correlated with the values that they are to weigh.
+    fn averaged(self, edges: &Edges, (width, height): (usize, usize)) -> Self {
+        let color = Planes::from_fn(width, height, 1, |_, x, y| self.color[y * width + x]);
+        Self {
+            color: color.box_mean(1).to_image(width, height, 1.0).data,
+            edges: edge_means::box_mean(edges, (width, height), &self.edges, 1, Missing::Zero),
+        }
+    }
 }
 
-/// Means over 3x3 pixels: variances of single ones are small where outliers happen to be missing, and follow what they
-/// are to weigh.
-fn averaged(values: Vec<f32>, (width, height): (usize, usize)) -> Vec<f32> {
-    let planes = Planes::from_fn(width, height, 1, |_, x, y| values[y * width + x]);
-    planes.box_mean(1).to_image(width, height, 1.0).data
+/// Variances of all samples.
+fn of_samples(inputs: &Inputs, edges: &Edges) -> Result<EstimateVariances> {
+    let sum = |[r, g, b, _]: Quad| (r + g + b) * inputs.scale;
+    Ok(EstimateVariances {
+        color: inputs.quads(Layer::ColorVariance)?.into_par_iter().map(sum).collect(),
+        edges: edges.variance.par_iter().map(|variance| sum(inputs.quad(*variance))).collect(),
+    })
 }
 
-/// How often each group is drawn.
+/// Number of times that each bin is drawn.
 type Draw = [u32; BINS];
 
-/// As many groups as there are, drawn with replacement; the same for all pixels, so that errors of neighbours stay as
-/// they are.
+/// As many bins as there are, drawn with replacement; the same for all pixels, so that errors of neighbours stay
+/// correlated as they are.
 fn draw(round: u32, which: u64) -> Draw {
     let mut draw = [0; BINS];
     for k in 0..BINS as u64 {
@@ -234,73 +247,87 @@ fn draw(round: u32, which: u64) -> Draw {
     draw
 }
 
-/// Images of all groups.
-struct Layers<'a> {
-    images: Vec<&'a [f32]>,
-    /// Those of the ambient light, if it is on.
-    lit: Vec<&'a [f32]>,
-    /// To the pixel that samples are taken of, too.
-    step: usize,
-}
-
-/// The samples of colour and differences in groups.
+/// Means of the bins of colours and of differences.
 struct Groups<'a> {
-    layers: [Layers<'a>; 3],
-    counts: &'a [f32],
+    color: Vec<&'a [f32]>,
+    /// Those of the ambient light, if it is on.
+    ambient_color: Vec<&'a [f32]>,
+    samples: &'a [f32],
+    edges: &'a Edges,
     scale: f32,
     ambient: f32,
 }
 
+/// Means of the drawn bins, and their variances if they are asked for.
+struct Drawn {
+    color: Vec<Quad>,
+    differences: Vec<Quad>,
+    variances: EstimateVariances,
+}
+
 impl<'a> Groups<'a> {
-    fn of(inputs: &Inputs<'a>, ambient: f32) -> Result<Self> {
-        inputs.frame.require(Layer::Dx)?;
+    fn new(inputs: &Inputs<'a>, edges: &'a Edges, ambient: f32) -> Result<Self> {
         let images = |layer: fn(u8) -> Layer| {
             let image = |k| Ok(inputs.frame.require(layer(k))?.data.as_slice());
             (0..BINS as u8).map(image).collect::<Result<Vec<_>>>()
         };
-        let lit = |layer| if ambient > 0.0 { images(layer) } else { Ok(Vec::new()) };
         Ok(Self {
-            layers: [
-                Layers { images: images(Layer::BinColor)?, lit: lit(Layer::BinAmbient)?, step: 0 },
-                Layers { images: images(Layer::BinDx)?, lit: lit(Layer::BinAmbientDx)?, step: 1 },
-                Layers { images: images(Layer::BinDy)?, lit: lit(Layer::BinAmbientDy)?, step: inputs.frame.width },
-            ],
-            counts: &inputs.frame.require(Layer::Samples)?.data,
+            color: images(Layer::BinColor)?,
+            ambient_color: if ambient > 0.0 { images(Layer::BinAmbient)? } else { Vec::new() },
+            samples: &inputs.frame.require(Layer::Samples)?.data,
+            edges,
             scale: inputs.scale,
             ambient,
         })
     }
 
-    /// Means of the drawn groups, and their variances, sums over the channels, if they are `wanted`.
-    fn draw(&self, draws: &[Draw; 3], wanted: bool) -> ([Vec<Quad>; 3], [Vec<f32>; 3]) {
-        let of = |which: usize| -> (Vec<Quad>, Vec<f32>) {
-            (0..self.counts.len()).into_par_iter().map(|i| self.pixel(which, &draws[which], i, wanted)).unzip()
+    /// The draws of a round, of colours and of the edges of every step on their own; every bin once without a round.
+    fn draw(&self, round: Option<u32>, with_variances: bool) -> Drawn {
+        let draw_of = |which: usize| round.map_or([1; BINS], |round| draw(round, which as u64));
+        let of_color = draw_of(0);
+        let of_kind: Vec<Draw> = (0..self.edges.offsets().len()).map(|kind| draw_of(1 + kind)).collect();
+        let pixel = |i: usize| {
+            let value = |k: usize, c: usize| self.color[k][3 * i + c];
+            let ambient = |k: usize, c: usize| self.ambient_color[k][3 * i + c];
+            self.mean(value, ambient, self.samples[i] as u32, &of_color, with_variances)
         };
-        let [(color, of_color), (dx, of_dx), (dy, of_dy)] = [of(0), of(1), of(2)];
-        ([color, dx, dy], [of_color, of_dx, of_dy])
+        let edge = |edge: usize| {
+            let value = |k: usize, c: usize| self.edges.bins[edge][k][c];
+            let ambient = |k: usize, c: usize| self.edges.ambient[edge][k][c];
+            let draw = &of_kind[self.edges.kind(edge)];
+            self.mean(value, ambient, self.edges.counts[edge], draw, with_variances)
+        };
+        let (color, color_variance) = (0..self.samples.len()).into_par_iter().map(pixel).unzip();
+        let (differences, edge_variance) = (0..self.edges.len()).into_par_iter().map(edge).unzip();
+        Drawn { color, differences, variances: EstimateVariances { color: color_variance, edges: edge_variance } }
     }
 
-    fn pixel(&self, which: usize, draw: &Draw, i: usize, wanted: bool) -> (Quad, f32) {
-        let Layers { images, lit, step } = &self.layers[which];
-        let Some(&far) = self.counts.get(i + step) else { return ([0.0; 4], 0.0) };
-        let samples = self.counts[i].min(far) as u32;
+    /// Mean of drawn bins of `samples` samples, and its variance, sum over the channels.
+    #[inline(always)]
+    fn mean(
+        &self,
+        value: impl Fn(usize, usize) -> f32,
+        ambient: impl Fn(usize, usize) -> f32,
+        samples: u32,
+        draw: &Draw,
+        with_variance: bool,
+    ) -> (Quad, f32) {
         let counts: Draw = std::array::from_fn(|k| bin_count(samples, k));
         let drawn: Draw = std::array::from_fn(|k| if counts[k] > 0 { draw[k] } else { 0 });
-        // With fewer samples than groups a draw may be empty; then it is as if all were drawn.
+        // With fewer samples than bins a draw may be empty; then all bins are drawn.
         let drawn = if drawn == [0; BINS] { counts.map(|count| count.min(1)) } else { drawn };
         let weights: [f32; BINS] = std::array::from_fn(|k| (drawn[k] * counts[k]) as f32);
         let share = 1.0 / weights.iter().sum::<f32>().max(1.0);
         let (mut mean, mut squares) = ([0.0; 4], 0.0);
         for c in 0..3 {
-            let mut values: [f32; BINS] = std::array::from_fn(|k| images[k][3 * i + c] * self.scale);
-            for (value, image) in values.iter_mut().zip(lit) {
-                *value += image[3 * i + c] * self.ambient;
+            let mut values: [f32; BINS] = std::array::from_fn(|k| value(k, c) * self.scale);
+            if self.ambient > 0.0 {
+                (0..BINS).for_each(|k| values[k] += ambient(k, c) * self.ambient);
             }
             mean[c] = share * (0..BINS).map(|k| weights[k] * values[k]).sum::<f32>();
-            if !wanted {
-                continue;
+            if with_variance {
+                squares += (0..BINS).map(|k| weights[k] * (values[k] - mean[c]).powi(2)).sum::<f32>();
             }
-            squares += (0..BINS).map(|k| weights[k] * (values[k] - mean[c]).powi(2)).sum::<f32>();
         }
         let groups: u32 = drawn.iter().sum();
         (mean, share * squares / (groups as f32 - 1.0).max(1.0))

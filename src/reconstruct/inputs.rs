@@ -1,30 +1,31 @@
-//! A frame as reconstructions work on it: planes, in units of the image's typical luminance.
+//! A frame as reconstructions work on it: planes and edges in units of the image's typical luminance.
 
 use rayon::prelude::*;
 
 use super::Context;
 use crate::error::{Error, Result};
-use crate::film::{Frame, Layer};
+use crate::film::{Edges, Frame, Layer};
 use crate::image::Image;
 use crate::image::nl_means::Guide;
 use crate::image::planes::{Planes, mirror};
+use crate::math::Rgb;
 use crate::solve::graph::Quad;
 
-/// Share of the mean variance around it that a colour's variance is raised to.
+/// Least variance of a colour, as a share of the mean variance of the pixels around it.
 pub const FLOOR: f32 = 0.5;
 
-/// The least luminance that is told from none: the square of one over it is still a float.
+/// Least typical luminance: the square of one over it is still a float.
 const LEAST_LUMINANCE: f32 = 1e-18;
 
 /// Scattered radiance, as layers of a frame.
 pub struct Inputs<'a> {
-    /// Where they come from.
+    /// The frame.
     pub frame: &'a Frame,
     /// Pixels in a row, after mirroring.
     pub width: usize,
     /// Rows, after mirroring.
     pub height: usize,
-    /// What radiance is multiplied by: results then do not depend on the exposure.
+    /// Factor of radiance: one over the typical luminance, so that results do not depend on the exposure.
     pub scale: f32,
     /// Mean number of samples of a pixel.
     pub spp: f32,
@@ -33,7 +34,7 @@ pub struct Inputs<'a> {
 impl<'a> Inputs<'a> {
     /// The inputs of a frame, mirrored until both sides are multiples of `multiple`.
     pub fn new(frame: &'a Frame, multiple: usize) -> Result<Self> {
-        // Where hardly anything shines, the scale is still a number.
+        // In an image that is all but black the scale is still finite.
         let scale = 1.0 / typical_luminance(frame.require(Layer::Color)?).max(LEAST_LUMINANCE);
         let samples = &frame.require(Layer::Samples)?.data;
         let spp = (samples.iter().map(|&n| f64::from(n)).sum::<f64>() / samples.len() as f64).max(1.0) as f32;
@@ -56,21 +57,24 @@ impl<'a> Inputs<'a> {
         Ok([self.planes(Layer::Color, self.scale)?, self.planes(Layer::ColorVariance, self.scale * self.scale)?])
     }
 
-    /// What pixels are compared by: the colour, its variance raised to a share of those around.
+    /// The colour as a guide for filters, its variance raised to a share of those around.
     pub fn guide(&self) -> Result<Guide> {
         let [mean, variance] = self.color()?;
-        Ok(Guide { mean, variance: raise(&variance.sum(), FLOOR), tolerance: None })
+        Ok(Guide { mean, variance: floor_variance(&variance.sum(), FLOOR), tolerance: None })
     }
 
     /// Differences along `axis` (0: to the right, 1: downwards) and their variances. Where the image is mirrored
     /// differences change their sign.
     pub fn gradient(&self, axis: usize) -> Result<[Planes; 2]> {
-        let (mean, variance) = [(Layer::Dx, Layer::DxVariance), (Layer::Dy, Layer::DyVariance)][axis];
+        let cross = self.frame.cross()?;
+        let variance = match cross.variance[axis] {
+            Some(variance) => variance,
+            None => self.frame.require([Layer::DxVariance, Layer::DyVariance][axis])?,
+        };
         let step = [(1, 0), (0, 1)][axis];
-        let edges = |layer, scale: f32, back: f32| {
-            let image = self.frame.require(layer)?;
+        let edges = |image: &Image, scale: f32, back: f32| {
             let (w, h) = (image.width, image.height);
-            Ok::<_, crate::error::Error>(Planes::from_fn(self.width, self.height, 3, |c, x, y| {
+            Planes::from_fn(self.width, self.height, 3, |c, x, y| {
                 let near = (self.inside(x, w), self.inside(y, h));
                 let far = (self.inside(x + step.0, w), self.inside(y + step.1, h));
                 let value = |(x, y): (usize, usize)| image.data[(y * w + x) * 3 + c] * scale;
@@ -79,9 +83,20 @@ impl<'a> Inputs<'a> {
                     () if far.0 + far.1 < near.0 + near.1 => back * value(far),
                     () => 0.0,
                 }
-            }))
+            })
         };
-        Ok([edges(mean, self.scale, -1.0)?, edges(variance, self.scale * self.scale, 1.0)?])
+        Ok([edges(cross.mean[axis], self.scale, -1.0), edges(variance, self.scale * self.scale, 1.0)])
+    }
+
+    /// Differences of edges times [`Inputs::scale`], edge by edge, as solvers take them.
+    pub fn differences(&self, edges: &Edges) -> Vec<Quad> {
+        edges.mean.par_iter().map(|mean| self.quad(*mean)).collect()
+    }
+
+    /// A colour times [`Inputs::scale`], as solvers take it.
+    pub fn quad(&self, color: Rgb) -> Quad {
+        let [r, g, b] = color.to_array();
+        [r * self.scale, g * self.scale, b * self.scale, 0.0]
     }
 
     /// Three channels of a layer times [`Inputs::scale`], pixel by pixel, as solvers take them. Not mirrored.
@@ -105,7 +120,7 @@ impl<'a> Inputs<'a> {
 
     /// A half of the samples' colour, times [`Inputs::scale`]; not mirrored.
     pub fn half(&self, half: usize) -> Result<Planes> {
-        let [mean, _] = self.frame.half(Layer::BinColor, half)?;
+        let [mean, _] = self.frame.color_half(half)?;
         let at = |c, x, y| mean.data[(y * mean.width + x) * 3 + c] * self.scale;
         Ok(Planes::from_fn(mean.width, mean.height, 3, at))
     }
@@ -141,7 +156,7 @@ pub fn quads(planes: &Planes, first: usize) -> Vec<Quad> {
 
 /// Variances raised to a share of the mean around them. Where all samples were zero the sample variance is zero too,
 /// which does not mean that the pixel is known.
-pub fn raise(variance: &Planes, share: f32) -> Planes {
+pub fn floor_variance(variance: &Planes, share: f32) -> Planes {
     variance.zip(&variance.box_mean(1), |variance, around| variance.max(share * around))
 }
 

@@ -3,16 +3,17 @@
 //! consistent.
 
 use super::inputs::{Inputs, check_memory};
-use super::{Context, Method, Parameter, Parameters, Reconstruction, Solution};
+use super::{Context, Method, Parameter, Parameters, Reconstruction, Solution, Traits};
 use crate::error::Result;
-use crate::film::{Frame, Layer, Needs};
+use crate::film::{EdgeParts, Frame, Layer, Needs};
 use crate::solve::irls;
-use crate::solve::poisson::Data;
+use crate::solve::poisson::Targets;
 
 /// `l1`.
 pub const METHOD: Method = Method {
     id: "l1",
     summary: "screened Poisson reconstruction that outliers among the differences do not spread in; consistent",
+    traits: Traits::POISSON,
     parameters: &[
         Parameter { name: "alpha", default: "0.2", summary: "weight of the colour against the differences, > 0" },
         Parameter {
@@ -23,9 +24,9 @@ pub const METHOD: Method = Method {
         Parameter {
             name: "epsilon",
             default: "0.05",
-            summary: "residual below which the norm is rounded off in the first of them, over the typical luminance",
+            summary: "residual below which the norm is smoothed in the first of them, over the typical luminance",
         },
-        Parameter { name: "decay", default: "0.3", summary: "what epsilon is multiplied by from one to the next" },
+        Parameter { name: "decay", default: "0.3", summary: "factor of epsilon from one to the next" },
     ],
     make,
 };
@@ -51,16 +52,17 @@ struct L1 {
 
 impl Reconstruction for L1 {
     fn needs(&self) -> Needs {
-        Needs { edges: true, ..Needs::default() }
+        Needs::EDGES
     }
 
     fn reconstruct(&self, frame: &Frame, context: &Context) -> Result<Solution> {
         let inputs = Inputs::new(frame, 1)?;
         check_memory(frame, context, METHOD.id, BYTES)?;
-        let (data, dx, dy) = (inputs.quads(Layer::Color)?, inputs.quads(Layer::Dx)?, inputs.quads(Layer::Dy)?);
-        let all = vec![1.0; data.len()];
-        let data = Data { width: frame.width, data: &data, edges: [&dx, &dy] };
-        let solution = irls::solve(data, [&all, &all], self.alpha, self.options);
+        let data = inputs.quads(Layer::Color)?;
+        let edges = frame.edges(EdgeParts::default())?;
+        let differences = inputs.differences(&edges);
+        let targets = Targets { edges: &edges, data: &data, differences: &differences };
+        let solution = irls::solve(targets, &vec![1.0; edges.len()], self.alpha, self.options);
         Ok(Solution { image: inputs.image(&solution), error: None, notes: Vec::new() })
     }
 }

@@ -3,20 +3,23 @@
 //! min |α (I - colour)|² + |Dx I - dx|² + |Dy I - dy|².
 //!
 //! It is linear in its data, so the result is as unbiased as they are, and keeps the mean. Values may be negative.
+//! Differences to the right and downwards are solved for exactly by cosine transforms, edges between other pixels by
+//! multigrid.
 
 use rayon::prelude::*;
 
-use super::inputs::check_memory;
-use super::{Context, Method, Parameter, Parameters, Reconstruction, Solution};
+use super::inputs::{Inputs, check_memory};
+use super::{Context, Method, Parameter, Parameters, Reconstruction, Solution, Traits};
 use crate::error::Result;
-use crate::film::{Frame, Layer, Needs};
+use crate::film::{Cross, EdgeParts, Frame, Layer, Needs};
 use crate::image::Image;
-use crate::solve::poisson;
+use crate::solve::poisson::{self, Targets, Weights};
 
 /// `l2`.
 pub const METHOD: Method = Method {
     id: "l2",
     summary: "screened Poisson reconstruction from colour and differences, unbiased",
+    traits: Traits { keeps_mean: true, ..Traits::POISSON },
     parameters: &[Parameter {
         name: "alpha",
         default: "0.2",
@@ -39,19 +42,43 @@ struct L2 {
 
 impl Reconstruction for L2 {
     fn needs(&self) -> Needs {
-        Needs { edges: true, ..Needs::default() }
+        Needs::EDGES
     }
 
     fn reconstruct(&self, frame: &Frame, context: &Context) -> Result<Solution> {
         check_memory(frame, context, METHOD.id, BYTES)?;
-        let [color, dx, dy] = [Layer::Color, Layer::Dx, Layer::Dy].map(|layer| frame.require(layer));
-        let (color, dx, dy) = (color?, dx?, dy?);
-        let solve = |c| poisson::screened(frame.width, &color.channel(c), &dx.channel(c), &dy.channel(c), self.alpha);
+        let image = match frame.cross() {
+            Err(_) if frame.has_own_edges() => self.by_multigrid(frame)?,
+            cross => self.by_cosines(frame.require(Layer::Color)?, &cross?),
+        };
+        Ok(Solution { image, error: None, notes: Vec::new() })
+    }
+}
+
+/// Residuals of the iterative solver are brought down to this share.
+const TOLERANCE: f64 = 1e-6;
+
+impl L2 {
+    /// Solves exactly on the grid of direct neighbours.
+    fn by_cosines(&self, color: &Image, cross: &Cross) -> Image {
+        let [dx, dy] = cross.mean;
+        let solve = |c| poisson::screened(color.width, &color.channel(c), &dx.channel(c), &dy.channel(c), self.alpha);
         let channels: Vec<_> = (0..3).into_par_iter().map(solve).collect();
-        let mut image = Image::new(frame.width, frame.height, 3);
+        let mut image = Image::new(color.width, color.height, 3);
         for (i, value) in image.data.iter_mut().enumerate() {
             *value = channels[i % 3][i / 3] as f32;
         }
-        Ok(Solution { image, error: None, notes: Vec::new() })
+        image
+    }
+
+    /// Solves for edges between any pixels.
+    fn by_multigrid(&self, frame: &Frame) -> Result<Image> {
+        let inputs = Inputs::new(frame, 1)?;
+        let edges = frame.edges(EdgeParts::default())?;
+        let (data, differences) = (inputs.quads(Layer::Color)?, inputs.differences(&edges));
+        let screen = (self.alpha * self.alpha) as f32;
+        let weights = Weights { edges: vec![1.0; edges.len()], screen: vec![screen; data.len()] };
+        let rhs = weights.rhs(Targets { edges: &edges, data: &data, differences: &differences });
+        Ok(inputs.image(&weights.solver(&edges).solve(&rhs, data, TOLERANCE).x))
     }
 }

@@ -1,22 +1,24 @@
-//! Least trimmed squares (Ha et al. 2019): differences that do not fit those of a denoised image are left out, as many
-//! of them as makes the solution of the others nearest to it. A spanning tree of the best differences always stays, so
-//! that no pixel is cut off.
+//! Least trimmed squares (Ha et al. 2019): the differences that fit a denoised image worst are left out, in the share
+//! that brings the solution of the others nearest to it. A spanning tree of the best differences always stays, so that no
+//! pixel is cut off.
 
 use rayon::prelude::*;
 
 use super::inputs::{Inputs, check_memory, quads};
-use super::{Context, Method, Parameter, Parameters, Reconstruction, Solution};
+use super::{Context, Method, Parameter, Parameters, Reconstruction, Solution, Traits};
 use crate::error::Result;
-use crate::film::{Frame, Layer, Needs};
+use crate::film::{EdgeParts, Edges, Frame, Layer, Needs};
 use crate::image::nl_means::{self, Guide, Guides, Settings};
+use crate::image::planes::{Planes, mirror};
 use crate::solve::graph::Quad;
 use crate::solve::irls;
-use crate::solve::poisson::{Data, Weights};
+use crate::solve::poisson::{Targets, Weights};
 
 /// `least_trimmed`.
 pub const METHOD: Method = Method {
     id: "least_trimmed",
     summary: "screened Poisson reconstruction without the differences that least fit a denoised image",
+    traits: Traits::POISSON,
     parameters: &[
         Parameter { name: "alpha", default: "0.2", summary: "weight of the colour against the differences, > 0" },
         Parameter {
@@ -29,7 +31,7 @@ pub const METHOD: Method = Method {
     make,
 };
 
-/// Shares of the differences that are tried, in percent: as far as from the spanning tree, which has half of them.
+/// Shares of the differences that are tried, in percent. The spanning tree alone has half of those of a cross.
 const SHARES: std::ops::RangeInclusive<usize> = 50..=100;
 const SHARE_STEP: usize = 5;
 
@@ -61,24 +63,26 @@ struct LeastTrimmed {
 
 impl Reconstruction for LeastTrimmed {
     fn needs(&self) -> Needs {
-        Needs { edges: true, ..Needs::default() }
+        Needs::EDGES
     }
 
     fn reconstruct(&self, frame: &Frame, context: &Context) -> Result<Solution> {
         let inputs = Inputs::new(frame, 1)?;
         check_memory(frame, context, METHOD.id, BYTES)?;
-        let (data, dx, dy) = (inputs.quads(Layer::Color)?, inputs.quads(Layer::Dx)?, inputs.quads(Layer::Dy)?);
-        let data = Data { width: frame.width, data: &data, edges: [&dx, &dy] };
+        let data = inputs.quads(Layer::Color)?;
+        let edges = frame.edges(EdgeParts::default())?;
+        let differences = inputs.differences(&edges);
+        let targets = Targets { edges: &edges, data: &data, differences: &differences };
         (context.progress)("denoise", 0.0);
-        let [denoised, dx, dy] = self.denoise(&inputs)?;
-        let order = order(data, [&dx, &dy]);
-        let mut best: Option<(f64, [Vec<f32>; 2])> = None;
-        let mut solution = data.data.to_vec();
+        let denoised = self.denoise(&inputs, &edges)?;
+        let order = order(targets, &denoised.differences);
+        let mut best: Option<(f64, Vec<f32>)> = None;
+        let mut solution = data.clone();
         for percent in SHARES.step_by(SHARE_STEP) {
             (context.progress)("trim", 0.3 + 0.6 * (percent - SHARES.start()) as f32 / 50.0);
             let kept = order.kept(percent);
-            solution = self.least_squares(data, &kept, solution, TRIAL);
-            let error = distance(&solution, &denoised);
+            solution = self.least_squares(targets, &kept, solution, TRIAL);
+            let error = distance(&solution, &denoised.color);
             if best.as_ref().is_none_or(|(least, _)| error < *least) {
                 best = Some((error, kept));
             }
@@ -86,32 +90,53 @@ impl Reconstruction for LeastTrimmed {
         let (_, kept) = best.expect("one share is tried");
         (context.progress)("solve", 0.9);
         let solution = if self.l1 {
-            irls::solve(data, [&kept[0], &kept[1]], self.alpha, irls::Options::default())
+            irls::solve(targets, &kept, self.alpha, irls::Options::default())
         } else {
-            self.least_squares(data, &kept, solution, FINAL)
+            self.least_squares(targets, &kept, solution, FINAL)
         };
         Ok(Solution { image: inputs.image(&solution), error: None, notes: Vec::new() })
     }
 }
 
+/// Colour and differences, averaged by the weights of a filter of the colour.
+struct Denoised {
+    color: Vec<Quad>,
+    differences: Vec<Quad>,
+}
+
 impl LeastTrimmed {
-    /// Colour and differences, all averaged by the weights of a filter of the colour.
-    fn denoise(&self, inputs: &Inputs) -> Result<[Vec<Quad>; 3]> {
+    fn denoise(&self, inputs: &Inputs, edges: &Edges) -> Result<Denoised> {
         let [color, variance] = inputs.color()?;
-        let ([dx, _], [dy, _]) = (inputs.gradient(0)?, inputs.gradient(1)?);
-        let values = color.and(&dx).and(&dy);
+        let values = edges
+            .offsets()
+            .iter()
+            .fold(color.clone(), |values, &offset| values.and(&difference_planes(inputs, edges, offset)));
         let color = Guide { mean: color, variance: variance.sum(), tolerance: None };
         let guides = Guides { color, features: Vec::new() };
         let settings = Settings { window: self.window, patch: PATCH, color: TOLERANCE, feature: None };
         let filtered = nl_means::filter(&values, &guides, settings);
-        Ok([0, 3, 6].map(|first| quads(&filtered, first)))
+        let of_kind: Vec<_> = (0..edges.offsets().len()).map(|kind| quads(&filtered, 3 + 3 * kind)).collect();
+        let differences = (0..edges.len()).map(|edge| of_kind[edges.kind(edge)][edges.ends(edge)[0]]);
+        Ok(Denoised { color: quads(&filtered, 0), differences: differences.collect() })
     }
 
-    fn least_squares(&self, data: Data, [across, down]: &[Vec<f32>; 2], start: Vec<Quad>, tolerance: f64) -> Vec<Quad> {
+    fn least_squares(&self, targets: Targets, kept: &[f32], start: Vec<Quad>, tolerance: f64) -> Vec<Quad> {
         let screen = vec![self.alpha * self.alpha; start.len()];
-        let weights = Weights { across: across.clone(), down: down.clone(), screen };
-        weights.solver(data.width).solve(&weights.right(data), start, tolerance).x
+        let weights = Weights { edges: kept.to_vec(), screen };
+        weights.solver(targets.edges).solve(&weights.rhs(targets), start, tolerance).x
     }
+}
+
+/// Differences of one step at their lower ends. Where a step leads out of the image it is mirrored, which may lead back
+/// over an edge in its other direction; without an edge the difference is zero.
+fn difference_planes(inputs: &Inputs, edges: &Edges, (dx, dy): (i32, i32)) -> Planes {
+    let (width, height) = (inputs.width, inputs.height);
+    let inside = |at: usize, step: i32, length: usize| mirror(at as isize + step as isize, length);
+    Planes::from_fn(width, height, 3, |c, x, y| {
+        let to = inside(y, dy, height) * width + inside(x, dx, width);
+        let half = edges.between(y * width + x, to);
+        half.map_or(0.0, |half| half.sign * inputs.quad(edges.mean[half.edge])[c])
+    })
 }
 
 /// Squared distance as relMSE has it, with the denoised image as reference.
@@ -126,54 +151,44 @@ fn distance(image: &[Quad], denoised: &[Quad]) -> f64 {
 
 /// Edges, those of the spanning tree first, the others by how well they fit.
 struct Order {
-    pixels: usize,
-    /// Twice the pixel, and one more for the edge downwards.
     edges: Vec<u32>,
+    /// Number of edges of the spanning tree.
     tree: usize,
 }
 
 impl Order {
     /// 1 for the first `percent` of the edges, and for the tree in any case; 0 for the others.
-    fn kept(&self, percent: usize) -> [Vec<f32>; 2] {
-        let mut kept = [vec![0.0; self.pixels], vec![0.0; self.pixels]];
+    fn kept(&self, percent: usize) -> Vec<f32> {
+        let mut kept = vec![0.0; self.edges.len()];
         let count = (self.edges.len() * percent).div_ceil(100).max(self.tree);
-        for edge in &self.edges[..count] {
-            kept[(edge % 2) as usize][(edge / 2) as usize] = 1.0;
-        }
+        self.edges[..count].iter().for_each(|&edge| kept[edge as usize] = 1.0);
         kept
     }
 }
 
-/// Orders the edges by how far they are from the differences of the denoised image.
-fn order(data: Data, smooth: [&[Quad]; 2]) -> Order {
-    let (width, pixels) = (data.width, data.data.len());
-    let there = |edge: u32| {
-        let i = edge as usize / 2;
-        if edge.is_multiple_of(2) { !(i + 1).is_multiple_of(width) } else { i + width < pixels }
-    };
+/// Orders the edges by their distance from the differences of the denoised image.
+fn order(targets: Targets, denoised: &[Quad]) -> Order {
     let misfit = |edge: u32| {
-        let (axis, i) = (edge as usize % 2, edge as usize / 2);
-        (0..3).map(|c| (data.edges[axis][i][c] - smooth[axis][i][c]).powi(2)).sum::<f32>()
+        let (sampled, denoised) = (targets.differences[edge as usize], denoised[edge as usize]);
+        (0..3).map(|c| (sampled[c] - denoised[c]).powi(2)).sum::<f32>()
     };
-    let mut edges: Vec<_> =
-        (0..2 * pixels as u32).into_par_iter().filter(|&edge| there(edge)).map(|edge| (misfit(edge), edge)).collect();
+    let mut edges: Vec<_> = (0..targets.edges.len() as u32).into_par_iter().map(|edge| (misfit(edge), edge)).collect();
     edges.par_sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     // Kruskal 1956: an edge that joins two parts of the forest belongs to the tree.
+    let pixels = targets.data.len();
     let mut parent: Vec<u32> = (0..pixels as u32).collect();
     let (mut tree, mut rest) = (Vec::with_capacity(pixels), Vec::with_capacity(edges.len()));
     for (_, edge) in edges {
-        let near = edge / 2;
-        let far = if edge.is_multiple_of(2) { near + 1 } else { near + width as u32 };
-        let (a, b) = (root(&mut parent, near), root(&mut parent, far));
+        let [a, b] = targets.edges.ends(edge as usize).map(|end| root(&mut parent, end as u32));
         parent[a as usize] = b;
         if a == b { rest.push(edge) } else { tree.push(edge) }
     }
     let count = tree.len();
     tree.append(&mut rest);
-    Order { pixels, edges: tree, tree: count }
+    Order { edges: tree, tree: count }
 }
 
-/// The node that stands for a node's part of the forest; ways there are halved as they are gone.
+/// The root of a node's tree in the forest; paths are halved on the way.
 fn root(parent: &mut [u32], mut node: u32) -> u32 {
     while parent[node as usize] != node {
         parent[node as usize] = parent[parent[node as usize] as usize];

@@ -1,7 +1,8 @@
-//! Reconstructions: methods that make an image of a frame.
+//! Reconstructions: methods that make an image from a frame.
 
 mod apr;
 mod control_variate;
+mod edge_means;
 mod feature;
 mod features;
 mod frgr;
@@ -23,42 +24,48 @@ use crate::error::{Error, Result};
 use crate::film::{Frame, Layer, Needs};
 use crate::image::Image;
 
-/// What a method makes.
+/// The result of a reconstruction.
 #[derive(Clone, Debug)]
 pub struct Solution {
-    /// The image, directly seen emitters included.
+    /// The image in radiance, directly seen emitters included.
     pub image: Image,
-    /// Expected squared error of each value, where the method knows it.
+    /// Expected squared error of each value, if the method estimates it.
     pub error: Option<Image>,
-    /// Images on the way to it, if the context asks for them.
+    /// Intermediate images, if the context asks for them.
     pub notes: Vec<Note>,
 }
 
 /// An intermediate image.
 #[derive(Clone, Debug)]
 pub struct Note {
-    /// What it is, in letters, digits and underscores.
+    /// Its name, in letters, digits and underscores.
     pub name: String,
     /// The image, in radiance.
     pub image: Image,
 }
 
-/// What a method is given besides the frame.
+/// Everything that a method gets besides the frame.
+#[derive(Clone, Copy)]
 pub struct Context<'a> {
-    /// Told what is being done and the finished share.
+    /// Called with the current stage and the finished share.
     pub progress: &'a dyn Fn(&str, f32),
-    /// Bytes that may be used besides the frame.
+    /// Limit of the memory besides the frame, in bytes.
     pub memory: Option<u64>,
     /// Whether intermediate images are wanted.
     pub notes: bool,
 }
 
+impl Context<'_> {
+    /// No progress, no limit, no intermediate images.
+    pub const QUIET: Self = Self { progress: &|_, _| {}, memory: None, notes: false };
+}
+
 /// A method with its parameters set.
 pub trait Reconstruction: Send + Sync {
-    /// What must be rendered for it.
+    /// Statistics that the method takes.
     fn needs(&self) -> Needs;
 
-    /// Whether solutions have an error.
+    /// Whether solutions have an estimated error.
     fn estimates_error(&self) -> bool {
         false
     }
@@ -74,16 +81,60 @@ pub struct Parameter {
     pub name: &'static str,
     /// Its value when not given.
     pub default: &'static str,
-    /// What it does, with its unit and range.
+    /// Its meaning, with unit and range.
     pub summary: &'static str,
+}
+
+/// Contracts that a method keeps with its default parameters; stress cases and tests check them.
+#[derive(Clone, Copy, Debug)]
+pub struct Traits {
+    /// A frame without noise is a fixed point. False for trained networks, whose images have no closed answers.
+    pub exact: bool,
+    /// The error is below that of the colours it is given.
+    pub denoises: bool,
+    /// The mean of the image is that of the colours, whatever the differences.
+    pub keeps_mean: bool,
+    /// A firefly stays within 16 pixels, with errors of the size of the noise outside.
+    pub robust: bool,
+    /// Treatment of differences.
+    pub edges: EdgeTrust,
+    /// Largest deviation at another exposure, of the largest value. More than rounding where the method makes decisions.
+    pub exposure_tolerance: f32,
+}
+
+/// How far a method trusts differences.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum EdgeTrust {
+    /// It takes none.
+    Unused,
+    /// Whatever their variances say.
+    Always,
+    /// By their variances.
+    ByVariance,
+}
+
+impl Traits {
+    /// A method that takes features and colours only.
+    pub const FILTER: Self = Self {
+        exact: true,
+        denoises: true,
+        keeps_mean: false,
+        robust: true,
+        edges: EdgeTrust::Unused,
+        exposure_tolerance: 1e-3,
+    };
+    /// A method that solves for differences, whatever their variances.
+    pub const POISSON: Self = Self { robust: false, edges: EdgeTrust::Always, ..Self::FILTER };
 }
 
 /// A row of the table of methods.
 pub struct Method {
-    /// The name in `--method`.
+    /// Name in `--method`.
     pub id: &'static str,
-    /// What it is.
+    /// Description for help texts.
     pub summary: &'static str,
+    /// Contracts that it keeps.
+    pub traits: Traits,
     /// Its parameters.
     pub parameters: &'static [Parameter],
     /// Builds it.
@@ -125,11 +176,11 @@ pub fn solve(method: &dyn Reconstruction, frame: &Frame, context: &Context) -> R
     for (layer, image) in frame.present() {
         if let Some((x, y, c)) = image.not_finite() {
             let what = format!("channel {} is not finite at pixel {x},{y}", layer.channel_names()[c]);
-            return Err(Error::Usage(what));
+            return Err(Error::BadData(what));
         }
         if let Some((x, y, c)) = image.find(|value| value < 0.0).filter(|_| layer.is_never_negative()) {
             let what = format!("channel {} is negative at pixel {x},{y}", layer.channel_names()[c]);
-            return Err(Error::Usage(what));
+            return Err(Error::BadData(what));
         }
     }
     let mut solution = method.reconstruct(frame, context)?;

@@ -3,7 +3,7 @@
 
 use super::features::{Feature, Kind};
 use super::inputs::{Inputs, check_memory};
-use super::{Context, Method, Parameter, Parameters, Reconstruction, Solution};
+use super::{Context, Method, Parameter, Parameters, Reconstruction, Solution, Traits};
 use crate::error::Result;
 use crate::film::{Frame, Needs};
 use crate::image::nl_means::{self, Guides, Settings};
@@ -12,6 +12,7 @@ use crate::image::nl_means::{self, Guides, Settings};
 pub const METHOD: Method = Method {
     id: "nlm",
     summary: "non-local means of the colour; path tracing only",
+    traits: Traits::FILTER,
     parameters: &[
         Parameter { name: "window", default: "9", summary: "radius of the window, 1 to 12 pixels" },
         Parameter { name: "patch", default: "3", summary: "radius of the patches that are compared, 0 to 4 pixels" },

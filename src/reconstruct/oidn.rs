@@ -1,6 +1,6 @@
 //! Open Image Denoise (Intel, 2018 on), a trained network, for comparison. It needs no gradients.
 
-use super::{Context, Method, Parameter, Parameters, Reconstruction, Solution};
+use super::{Context, Method, Parameter, Parameters, Reconstruction, Solution, Traits};
 use crate::error::Result;
 use crate::film::{Frame, Layer, Needs};
 use crate::image::oidn::denoise;
@@ -9,6 +9,7 @@ use crate::image::oidn::denoise;
 pub const METHOD: Method = Method {
     id: "oidn",
     summary: "Open Image Denoise, a trained network, with albedo and normal; path tracing only",
+    traits: Traits { exact: false, ..Traits::FILTER },
     parameters: &[
         Parameter {
             name: "prefilter",

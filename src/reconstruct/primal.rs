@@ -1,6 +1,6 @@
 //! The mean of the samples: plain path tracing.
 
-use super::{Context, Method, Reconstruction, Solution};
+use super::{Context, Method, Reconstruction, Solution, Traits};
 use crate::error::Result;
 use crate::film::{Frame, Layer, Needs};
 
@@ -8,6 +8,7 @@ use crate::film::{Frame, Layer, Needs};
 pub const METHOD: Method = Method {
     id: "primal",
     summary: "the mean of the samples, as path tracing gives it",
+    traits: Traits { denoises: false, keeps_mean: true, robust: false, ..Traits::FILTER },
     parameters: &[],
     make: |_| Ok(Box::new(Primal)),
 };

@@ -2,7 +2,7 @@
 
 use super::features::{Feature, Kind};
 use super::inputs::{Inputs, check_memory};
-use super::{Context, Method, Parameter, Parameters, Reconstruction, Solution};
+use super::{Context, Method, Parameter, Parameters, Reconstruction, Solution, Traits};
 use crate::error::Result;
 use crate::film::{Frame, Needs};
 use crate::image::nl_means::Guides;
@@ -12,6 +12,7 @@ use crate::image::nl_means::rdfc::{self, Denoised, Options};
 pub const METHOD: Method = Method {
     id: "rdfc",
     summary: "three non-local means by colour and features, the best at each pixel; path tracing only, consistent",
+    traits: Traits::FILTER,
     parameters: &[
         Parameter { name: "window", default: "5", summary: "radius of the window, 1 to 12 pixels" },
         Parameter { name: "choice", default: "2", summary: "radius that the choice is smoothed over, 1 to 12 pixels" },

@@ -63,7 +63,7 @@ pub fn occlusion(scene: &Scene, features: &Features, u: Vec2) -> f32 {
         return 1.0;
     }
     let direction = Frame::around(features.normal).to_world(warp::cosine_hemisphere(u));
-    f32::from(u8::from(scene.is_open(features.position, features.normal, direction, OPEN)))
+    f32::from(u8::from(scene.is_unoccluded(features.position, features.normal, direction, OPEN)))
 }
 
 /// The features of a ray that meets nothing: beyond everything.

@@ -1,18 +1,31 @@
 //! Rendering: waves of paths into a film.
+//!
+//! ```text
+//! schedule (tiles, rounds) -> wave -+- tracer: camera, direct, emission, continuation -> record
+//!                                   +- gradient: shift mappings -> differences of the record's samples
+//! ```
 
+mod camera;
+mod continuation;
+mod direct;
+mod emission;
 mod features;
 pub mod gradient;
-mod path;
 mod paths;
+mod record;
 mod sampler;
 mod schedule;
+mod tracer;
 mod vertices;
 mod wave;
 
 use serde::{Deserialize, Serialize};
 
+pub use self::gradient::{SHIFTS, Shift};
 pub use self::sampler::Sampler;
-pub use self::schedule::{Budget, Control, Keeper, Outcome, Settings, raise, render, resume, sample};
+pub use self::schedule::{
+    Budget, CheckpointSink, Control, RenderOutcome, RenderSettings, render, render_to_counts, resume, sample,
+};
 
 /// One sample of one pixel, the same whenever and wherever it is asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]

@@ -1,4 +1,4 @@
-//! Rounds of tiles on all threads, until the samples or the time are used up or someone says stop.
+//! Rounds of tiles on all threads, until the samples or the time are used up or the caller asks to stop.
 
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -7,12 +7,12 @@ use std::time::{Duration, Instant};
 use rayon::prelude::*;
 
 use super::SampleId;
-use super::gradient::shift::Shift;
+use super::gradient::Shift;
 use super::wave::Wave;
 use crate::film::{Film, Needs, Rejected, Sample, TILE, Tile};
 use crate::scene::Scene;
 
-/// How much to render.
+/// Limit of a render.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Budget {
     /// Samples of every pixel.
@@ -21,75 +21,90 @@ pub enum Budget {
     Time(Duration),
 }
 
-/// What to render.
+/// Everything that decides the samples of a render.
 #[derive(Clone, Copy, Debug)]
-pub struct Settings {
-    /// How much.
+pub struct RenderSettings {
+    /// When to stop.
     pub budget: Budget,
     /// Different seeds give independent images.
     pub seed: u64,
-    /// Number of the first sample of every pixel: renders that go on where others end take samples together that are
-    /// spread better than independent ones.
+    /// Number of the first sample of every pixel. Films of one seed with consecutive numbers are better stratified together
+    /// than films of different seeds.
     pub first: u32,
-    /// What to record; edges make it gradient-domain path tracing.
+    /// Statistics to record; sampled edges make it gradient-domain path tracing.
     pub needs: Needs,
-    /// How differences to neighbours are sampled.
+    /// Shift mapping that samples the differences.
     pub shift: Shift,
 }
 
-/// Keeps what has been rendered while there is more to come.
-pub trait Keeper: Sync {
-    /// Whether it is time again; asked between tiles.
+impl RenderSettings {
+    /// Seed 0 and the default shift.
+    pub fn new(budget: Budget, needs: Needs) -> Self {
+        Self { budget, seed: 0, first: 0, needs, shift: Shift::default() }
+    }
+}
+
+/// Receives checkpoints of a render.
+pub trait CheckpointSink: Sync {
+    /// Whether the next checkpoint is due; called between tiles.
     fn due(&self) -> bool;
 
-    /// Called while nothing is being traced, and when the render has ended.
-    fn keep(&self, outcome: &Outcome);
+    /// Saves a checkpoint; called while no tile is being rendered, and at the end of the render.
+    fn save(&self, outcome: &RenderOutcome);
 }
 
-/// Threads between the caller and a render that is under way.
+/// Connections between the caller and a running render.
 #[derive(Clone, Copy)]
 pub struct Control<'a> {
-    /// Set to end the render after the tiles that are being worked on.
+    /// Set by the caller to end the render after the tiles that are being rendered.
     pub stop: &'a AtomicBool,
-    /// Told the finished share, in [0, 1].
+    /// Called with the finished share, in [0, 1].
     pub progress: &'a (dyn Fn(f32) + Sync),
-    /// Who keeps the film from time to time.
-    pub keeper: Option<&'a dyn Keeper>,
+    /// Receiver of checkpoints.
+    pub sink: Option<&'a dyn CheckpointSink>,
 }
 
-/// A rendered film and how it went.
-pub struct Outcome {
+/// The flag of renders that are never stopped; nobody sets it.
+static NEVER: AtomicBool = AtomicBool::new(false);
+
+impl Control<'_> {
+    /// Never stops, and reports to nobody.
+    pub const QUIET: Self = Self { stop: &NEVER, progress: &|_| {}, sink: None };
+}
+
+/// A rendered film with its statistics.
+pub struct RenderOutcome {
     /// The film.
     pub film: Film,
     /// Samples of the pixel that has the fewest.
     pub spp: u32,
-    /// Wall-clock time, that of earlier sessions included.
+    /// Wall-clock time, including that before a resumption.
     pub elapsed: Duration,
-    /// Whether `stop` ended it early.
+    /// Whether the caller stopped it early.
     pub stopped: bool,
     /// The first sample that was not finite, for `--replay`.
     pub first_rejected: Option<(SampleId, Rejected)>,
 }
 
-impl Outcome {
-    /// Nothing rendered yet.
+impl RenderOutcome {
+    /// An empty film.
     pub fn new(scene: &Scene, needs: Needs) -> Self {
         let film = Film::new(scene.sensor().width, scene.sensor().height, needs);
         Self { film, spp: 0, elapsed: Duration::ZERO, stopped: false, first_rejected: None }
     }
 }
 
-/// Samples that a round adds to every pixel: few enough for progress and for stopping in time.
+/// Samples that a round adds to every pixel: few enough for smooth progress and for meeting time limits.
 const ROUND: u32 = 8;
 
 /// Renders until the budget is used up.
-pub fn render(scene: &Scene, settings: Settings, control: &Control) -> Outcome {
-    resume(scene, settings, control, Outcome::new(scene, settings.needs))
+pub fn render(scene: &Scene, settings: RenderSettings, control: &Control) -> RenderOutcome {
+    resume(scene, settings, control, RenderOutcome::new(scene, settings.needs))
 }
 
-/// Goes on with a render of the same settings, wherever it ended, until the budget of both is used up. Samples are the
-/// same bits as in a render without interruption.
-pub fn resume(scene: &Scene, settings: Settings, control: &Control, mut outcome: Outcome) -> Outcome {
+/// Continues a render of the same settings, wherever it was interrupted, until the budget of both is used up. The samples
+/// have the same bits as without the interruption.
+pub fn resume(scene: &Scene, settings: RenderSettings, control: &Control, mut outcome: RenderOutcome) -> RenderOutcome {
     outcome.stopped = false;
     while let (false, Some(round)) = (outcome.stopped, next_round(settings.budget, outcome.spp, outcome.elapsed)) {
         let (done, elapsed, start) = (outcome.spp, outcome.elapsed, Instant::now());
@@ -102,14 +117,20 @@ pub fn resume(scene: &Scene, settings: Settings, control: &Control, mut outcome:
         let control = Control { progress: &progress, ..*control };
         run_round(scene, settings, &control, &mut outcome, &|_, _| done + round);
     }
-    if let Some(keeper) = control.keeper {
-        keeper.keep(&outcome);
+    if let Some(sink) = control.sink {
+        sink.save(&outcome);
     }
     outcome
 }
 
-/// Goes on until each pixel has as many samples as `goals` says, row by row. The budget is not looked at.
-pub fn raise(scene: &Scene, settings: Settings, control: &Control, outcome: &mut Outcome, goals: &[u32]) {
+/// Continues until each pixel has as many samples as `goals` says, row by row. The budget is ignored.
+pub fn render_to_counts(
+    scene: &Scene,
+    settings: RenderSettings,
+    control: &Control,
+    outcome: &mut RenderOutcome,
+    goals: &[u32],
+) {
     let width = outcome.film.width;
     run_round(scene, settings, control, outcome, &|x, y| goals[y * width + x]);
 }
@@ -129,11 +150,11 @@ fn next_round(budget: Budget, done: u32, elapsed: Duration) -> Option<u32> {
     }
 }
 
-/// Number of samples that the pixel in a column and row is to have after a round.
+/// Goal of a round: the number of samples of the pixel in a column and row.
 type Goals<'a> = &'a (dyn Fn(usize, usize) -> u32 + Sync);
 
-/// Renders a round, with pauses whenever the film is to be kept.
-fn run_round(scene: &Scene, settings: Settings, control: &Control, outcome: &mut Outcome, goals: Goals) {
+/// Renders a round, with pauses for checkpoints.
+fn run_round(scene: &Scene, settings: RenderSettings, control: &Control, outcome: &mut RenderOutcome, goals: Goals) {
     let (before, start) = (outcome.elapsed, Instant::now());
     let mut paused = true;
     while paused {
@@ -141,15 +162,21 @@ fn run_round(scene: &Scene, settings: Settings, control: &Control, outcome: &mut
         outcome.elapsed = before + start.elapsed();
         outcome.spp = outcome.film.fewest_samples();
         outcome.stopped = control.stop.load(Ordering::Relaxed);
-        if let (true, Some(keeper)) = (paused, control.keeper) {
-            keeper.keep(outcome);
+        if let (true, Some(sink)) = (paused, control.sink) {
+            sink.save(outcome);
         }
     }
 }
 
-/// Brings tiles to their goals until the film is to be kept, which returns true. `control.progress` is told the share
-/// of them.
-fn run_tiles(scene: &Scene, settings: Settings, control: &Control, outcome: &mut Outcome, goals: Goals) -> bool {
+/// Renders tiles up to their goals, until a checkpoint is due, which returns true. `control.progress` is called with the
+/// share of finished tiles.
+fn run_tiles(
+    scene: &Scene,
+    settings: RenderSettings,
+    control: &Control,
+    outcome: &mut RenderOutcome,
+    goals: Goals,
+) -> bool {
     let first_rejected = Mutex::new(outcome.first_rejected);
     let due = AtomicBool::new(false);
     let tiles = outcome.film.tiles_mut();
@@ -168,8 +195,8 @@ fn run_tiles(scene: &Scene, settings: Settings, control: &Control, outcome: &mut
         let mut done = done.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
         *done += 1;
         (control.progress)(*done as f32 / total as f32);
-        // A tile that was at its goal already is no reason for another pause.
-        if worked && control.keeper.is_some_and(|keeper| keeper.due()) {
+        // A tile that was at its goal already is no reason for another checkpoint.
+        if worked && control.sink.is_some_and(|sink| sink.due()) {
             due.store(true, Ordering::Relaxed);
         }
     });
@@ -177,13 +204,12 @@ fn run_tiles(scene: &Scene, settings: Settings, control: &Control, outcome: &mut
     due.into_inner()
 }
 
-fn run_tile(settings: Settings, wave: &mut Wave, tile: &mut Tile, goals: Goals) -> Option<(SampleId, Rejected)> {
+fn run_tile(settings: RenderSettings, wave: &mut Wave, tile: &mut Tile, goals: Goals) -> Option<(SampleId, Rejected)> {
     let mut first_rejected = None;
-    let at = |pixel: usize, tile: &Tile| (tile.x + pixel % tile.width, tile.y + pixel / tile.width);
-    // Samples of one number are traced together, whatever number a pixel begins with.
+    // Samples of one number are traced together, whatever number a pixel starts with.
     let spans: Vec<_> = (0..tile.width * tile.height)
         .map(|pixel| {
-            let (x, y) = at(pixel, tile);
+            let (x, y) = tile.pixel(pixel);
             tile.count(pixel)..goals(x, y)
         })
         .collect();
@@ -194,7 +220,7 @@ fn run_tile(settings: Settings, wave: &mut Wave, tile: &mut Tile, goals: Goals) 
         numbers.clear();
         numbers.extend((0..spans.len()).filter(|&pixel| spans[pixel].contains(&index)));
         pixels.clear();
-        pixels.extend(numbers.iter().map(|&pixel| at(pixel, tile)));
+        pixels.extend(numbers.iter().map(|&pixel| tile.pixel(pixel)));
         let samples = wave.trace(settings.seed, settings.first + index, &pixels);
         for ((&pixel, &(x, y)), sample) in numbers.iter().zip(&pixels).zip(samples) {
             if let Err(reason) = tile.add(pixel, sample) {
@@ -206,7 +232,7 @@ fn run_tile(settings: Settings, wave: &mut Wave, tile: &mut Tile, goals: Goals) 
     first_rejected
 }
 
-/// A single sample as it is taken in a render of the whole film, with all that can be recorded of it.
+/// A single sample with everything that can be recorded of it, the same as in a render of the whole film.
 pub fn sample(scene: &Scene, id: SampleId, shift: Shift) -> Sample {
     let (x, y) = (id.x / TILE * TILE, id.y / TILE * TILE);
     let (width, height) = (TILE.min(scene.sensor().width - x), TILE.min(scene.sensor().height - y));

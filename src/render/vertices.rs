@@ -6,8 +6,8 @@ use crate::scene::packet::{Evals, Lights, Materials, Scatters, Surfaces};
 /// Sixteen vertices of as many paths.
 #[derive(Clone)]
 pub struct Vertices {
-    /// Which of the paths have met a surface that they may scatter at.
-    pub met: Mask,
+    /// Which of the paths have hit a surface that they may scatter at.
+    pub hit: Mask,
     /// Numbers of the paths' samples in the wave.
     pub id: Bits,
     /// The surfaces.
@@ -30,7 +30,7 @@ pub struct Vertices {
     pub next: Bits,
     /// Which lead to an emitter.
     pub emits: Mask,
-    /// What is met there.
+    /// What is hit there.
     pub emission: Emission,
 }
 
@@ -52,7 +52,7 @@ pub struct Light {
 /// Emitters that paths have run into by scattering.
 #[derive(Clone)]
 pub struct Emission {
-    /// The points that were met.
+    /// The points that were hit.
     pub points: Lights,
     /// Radiance they send back.
     pub radiance: Lanes3,
@@ -65,7 +65,7 @@ impl Default for Vertices {
         let (zero, zero3) = (Lanes::ZERO, Lanes3::ZERO);
         let points = Lights::default();
         Self {
-            met: Mask::NONE,
+            hit: Mask::NONE,
             id: Bits::ZERO,
             surfaces: Surfaces::default(),
             materials: Materials::default(),

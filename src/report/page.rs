@@ -82,7 +82,7 @@ impl Page<'_> {
             "crop": CROP,
             "views": views,
         });
-        let data = serde_json::to_string(&data).map_err(|error| Error::Usage(error.to_string()))?;
+        let data = serde_json::to_string(&data).map_err(|error| Error::backend("json", error))?;
         // Nothing in the data may end the element that holds it.
         let data = data.replace('<', "\\u003c");
         Ok(include_str!("page.html")

@@ -40,6 +40,6 @@ pub fn data_url(image: &Image) -> Result<String> {
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_depth(png::BitDepth::Eight);
     let written = encoder.write_header().and_then(|mut writer| writer.write_image_data(&bytes));
-    written.map_err(|error| Error::Usage(format!("cannot encode a picture: {error}")))?;
+    written.map_err(|error| Error::backend("png", format!("cannot encode a picture: {error}")))?;
     Ok(format!("data:image/png;base64,{}", STANDARD.encode(&png)))
 }

@@ -3,13 +3,13 @@
 
 pub mod accel;
 pub mod bsdf;
-mod census;
 pub mod emitter;
 pub mod load;
 pub mod packet;
 mod ray_log;
 pub mod sensor;
 pub mod shape;
+mod stats;
 pub mod surface;
 pub mod texture;
 
@@ -17,12 +17,12 @@ use std::sync::Arc;
 
 use self::accel::Accel;
 use self::bsdf::Bsdf;
-pub use self::census::Census;
 use self::emitter::{Choice, Emitter, LightPoint};
-use self::packet::{Finish, Lamp};
+use self::packet::{EmitterInfo, ShapeInfo};
 use self::sensor::Sensor;
 pub use self::shape::Bounds;
 use self::shape::Geometry;
+pub use self::stats::SceneStats;
 pub use self::surface::Surface;
 use crate::error::Result;
 use crate::math::{Mat4, Rgb, Vec3};
@@ -31,11 +31,11 @@ use std::path::PathBuf;
 /// A ray with a unit direction.
 #[derive(Clone, Copy, Debug)]
 pub struct Ray {
-    /// Where it starts.
+    /// Origin.
     pub origin: Vec3,
-    /// Where it goes, of length one.
+    /// Direction, of length one.
     pub direction: Vec3,
-    /// Where it ends.
+    /// Length of the ray.
     pub t_far: f32,
 }
 
@@ -63,17 +63,17 @@ impl Default for Integrator {
     }
 }
 
-/// A surface with what it is made of.
+/// A surface with its material.
 pub struct Shape {
-    /// Its surface.
+    /// The surface.
     pub geometry: Arc<Geometry>,
-    /// Its material.
+    /// The material.
     pub bsdf: Arc<dyn Bsdf>,
-    /// Its number among the emitters, if it glows.
+    /// Index among the emitters, if it is emissive.
     pub emitter: Option<u32>,
 }
 
-/// Shapes that are placed in the world together, any number of times.
+/// Shapes that are instanced together, any number of times.
 pub struct Group {
     /// The shapes, in the group's own coordinates.
     pub shapes: Vec<Shape>,
@@ -81,13 +81,13 @@ pub struct Group {
     pub placements: Vec<Mat4>,
 }
 
-/// What a loader hands over.
-pub struct Parts {
-    /// Shapes that stand by themselves, in the order of the file.
+/// Everything that a scene is built from, as loaders find it.
+pub struct SceneDescription {
+    /// Shapes in world space, in the order of the file.
     pub shapes: Vec<Shape>,
-    /// Shapes that are placed as groups.
+    /// Shapes that are instanced.
     pub groups: Vec<Group>,
-    /// Emitters, numbered as the shapes name them.
+    /// Emitters, in the order of the shapes' indices.
     pub emitters: Vec<Box<dyn Emitter>>,
     /// The camera.
     pub sensor: Sensor,
@@ -95,24 +95,24 @@ pub struct Parts {
     pub integrator: Integrator,
     /// Hash of the scene's text.
     pub fingerprint: u64,
-    /// Meshes and images that it was read from.
+    /// Mesh and image files that it was read from.
     pub files: Vec<PathBuf>,
 }
 
-/// Everything a path can meet.
+/// Geometry, materials, emitters and sensor.
 pub struct Scene {
     accel: Accel,
-    /// Those that stand by themselves, then those of the groups.
+    /// Shapes in world space, then those of the groups.
     shapes: Vec<Shape>,
     emitters: Vec<Box<dyn Emitter>>,
     /// `None` when nothing emits.
     emitter_choice: Option<Choice>,
-    /// What packets have to know of the shapes, and of the emitters.
-    finishes: Vec<Finish>,
-    lamps: Vec<Lamp>,
+    /// Properties that packets use in place of virtual calls.
+    shape_infos: Vec<ShapeInfo>,
+    emitter_infos: Vec<EmitterInfo>,
     environment: Option<u32>,
-    /// The environment, if it is an image that is chosen with the same chance everywhere.
-    map: Option<u32>,
+    /// The environment, if it is an image.
+    envmap: Option<u32>,
     sensor: Sensor,
     integrator: Integrator,
     fingerprint: u64,
@@ -121,32 +121,33 @@ pub struct Scene {
 
 impl Scene {
     /// Builds the acceleration structure and the emitter choice.
-    pub fn build(parts: Parts, threads: usize) -> Result<Self> {
-        let Parts { mut shapes, groups, mut emitters, sensor, integrator, fingerprint, files } = parts;
+    pub fn build(parts: SceneDescription, threads: usize) -> Result<Self> {
+        let SceneDescription { mut shapes, groups, mut emitters, sensor, integrator, fingerprint, files } = parts;
         let accel = Accel::build(&shapes, &groups, threads)?;
         shapes.extend(groups.into_iter().flat_map(|group| group.shapes));
         let numbered = (0u32..).zip(&emitters);
-        let surrounding: Vec<_> = numbered.filter(|(_, emitter)| emitter.is_environment()).map(|(i, _)| i).collect();
-        if surrounding.len() > 1 {
+        let environments: Vec<_> = numbered.filter(|(_, emitter)| emitter.is_environment()).map(|(i, _)| i).collect();
+        if environments.len() > 1 {
             let what = "the scene has more than one environment (envmap or constant emitter); it can have one";
-            return Err(crate::error::Error::Usage(what.into()));
+            return Err(crate::error::Error::BadData(what.into()));
         }
         emitters.iter_mut().for_each(|emitter| emitter.enclose(accel.bounds()));
         let emitter_choice = Choice::new(&emitters);
         let chance = |index| emitter_choice.as_ref().and_then(|choice| choice.constant(index));
-        let lamps = emitters.iter().enumerate().map(|(i, emitter)| Lamp::new(&**emitter, chance(i))).collect();
-        let finishes = shapes.iter().map(Finish::new).collect();
-        let environment = surrounding.first().copied();
-        let map = environment.filter(|&index| emitters[index as usize].map().is_some());
+        let emitter_infos =
+            emitters.iter().enumerate().map(|(i, emitter)| EmitterInfo::new(&**emitter, chance(i))).collect();
+        let shape_infos = shapes.iter().map(ShapeInfo::new).collect();
+        let environment = environments.first().copied();
+        let envmap = environment.filter(|&index| emitters[index as usize].envmap().is_some());
         Ok(Self {
             accel,
             shapes,
             emitters,
             emitter_choice,
-            finishes,
-            lamps,
+            shape_infos,
+            emitter_infos,
             environment,
-            map,
+            envmap,
             sensor,
             integrator,
             fingerprint,
@@ -178,9 +179,8 @@ impl Scene {
         surface::epsilon(p, self.accel.size())
     }
 
-    /// Whether nothing is met from a point on a surface with this normal along `direction`, for a `share` of the scene's
-    /// size.
-    pub fn is_open(&self, p: Vec3, n: Vec3, direction: Vec3, share: f32) -> bool {
+    /// Whether a ray from a point on a surface with this normal is unoccluded for a `share` of the scene's size.
+    pub fn is_unoccluded(&self, p: Vec3, n: Vec3, direction: Vec3, share: f32) -> bool {
         let from = surface::offset(p, n, self.epsilon(p), direction);
         !self.accel.blocked(from, from + direction * (share * self.accel.size()))
     }
@@ -202,7 +202,7 @@ impl Scene {
         self.emitters[point.emitter as usize].radiance(point, direction)
     }
 
-    /// The surface as a point of its emitter, if it is one.
+    /// The surface as a point of its emitter, if it is emissive.
     pub fn light_point(&self, surface: &Surface) -> Option<LightPoint> {
         let emitter = self.shapes[surface.at.shape as usize].emitter?;
         Some(LightPoint::on_surface(surface, emitter))
@@ -211,7 +211,7 @@ impl Scene {
     /// The environment as seen along `direction`, if there is one.
     pub fn environment(&self, direction: Vec3) -> Option<LightPoint> {
         let emitter = self.environment?;
-        Some(LightPoint { emitter, ..self.emitters[emitter as usize].around(direction) })
+        Some(LightPoint { emitter, ..self.emitters[emitter as usize].environment_point(direction) })
     }
 
     /// The camera.
@@ -249,17 +249,17 @@ impl Scene {
         self.fingerprint
     }
 
-    /// Meshes and images that it was read from.
+    /// Mesh and image files that it was read from.
     pub fn files(&self) -> &[PathBuf] {
         &self.files
     }
 
-    /// Keeps every ray that is traced from now on, to know what they take by themselves.
+    /// Keeps every ray that is traced from now on, to measure the time of tracing alone.
     pub fn log_rays(&mut self) {
         self.accel.log_rays();
     }
 
-    /// Traces all rays kept once more and does nothing else; returns their number, and that of those which met something.
+    /// Traces all kept rays again and does nothing else; returns their number and the number of hits.
     pub fn replay_rays(&self) -> (usize, usize) {
         self.accel.replay_rays()
     }

@@ -3,19 +3,21 @@
 
 use rayon::prelude::*;
 
+use crate::film::Edges;
+
 /// Up to four right-hand sides or solutions at a node, which are worked on together.
 pub type Quad = [f32; 4];
 
 /// Nodes that a thread takes at a time.
 pub const CHUNK: usize = 8192;
 
-/// Times that nodes are joined in pairs for the next level.
+/// Number of pairwise aggregations from one level to the next.
 const ROUNDS: u32 = 3;
 
 /// Most nodes that a node of the next level stands for.
 pub const MEMBERS: usize = 1 << ROUNDS;
 
-/// A node that no coarse node stands for, since its own weight all but decides its value.
+/// Stands in place of a coarse node for a node that has none, since its own screening weight all but decides its value.
 pub const ALONE: u32 = u32::MAX;
 
 /// A symmetric matrix: on the diagonal the screening weight and the edge weights, beside it minus the edge weights.
@@ -29,22 +31,15 @@ pub struct Graph {
 }
 
 impl Graph {
-    /// Pixels of an image whose rows have `width` pixels, with edges to the right and downwards. What is stored
-    /// where an image has no such edge is not read.
-    pub fn from_grid(width: usize, across: &[f32], down: &[f32], screen: &[f32]) -> Self {
-        let nodes = screen.len();
-        let edges_of = |i: usize, edges: &mut Vec<(u32, f32)>| {
-            let mut add = |there: bool, to: usize, weight: &[f32], at: usize| {
-                if there && weight[at] > 0.0 {
-                    edges.push((to as u32, weight[at]));
-                }
-            };
-            add(i >= width, i.wrapping_sub(width), down, i.wrapping_sub(width));
-            add(!i.is_multiple_of(width), i.wrapping_sub(1), across, i.wrapping_sub(1));
-            add(!(i + 1).is_multiple_of(width), i + 1, across, i);
-            add(i + width < nodes, i + width, down, i);
-        };
-        Self::build(screen.to_vec(), edges_of)
+    /// The graph of pixels and the edges between them; edges without weight are left out. A row's entries are in the
+    /// order of their nodes.
+    pub fn new(edges: &Edges, weights: &[f32], screen: &[f32]) -> Self {
+        Self::build(screen.to_vec(), |pixel, out| {
+            let first = out.len();
+            let weighted = edges.around(pixel).map(|half| (half.to as u32, weights[half.edge]));
+            out.extend(weighted.filter(|(_, weight)| *weight > 0.0));
+            out[first..].sort_unstable_by_key(|(to, _)| *to);
+        })
     }
 
     /// A graph from its screening weights and a function that appends a node's edges.
@@ -116,7 +111,7 @@ impl Graph {
         std::array::from_fn(|c| b[node][c] - row[c])
     }
 
-    /// Joins nodes in pairs along their strongest edges. Returns what became of every node, and how many there are.
+    /// Joins nodes in pairs along their strongest edges. Returns the pair of every node, and the number of pairs.
     fn pairs(&self) -> (Vec<u32>, usize) {
         const UNSEEN: u32 = u32::MAX - 1;
         let mut joined = vec![UNSEEN; self.len()];
@@ -171,7 +166,7 @@ impl Graph {
         })
     }
 
-    /// A graph of about an eighth of the nodes, and which of them stands for each node here.
+    /// A graph of about an eighth of the nodes, and the coarse node that stands for each node here.
     pub fn coarsen(&self) -> (Self, Vec<u32>) {
         let (mut joined, count) = self.pairs();
         let mut coarse = self.contract(&joined, count);

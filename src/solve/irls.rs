@@ -3,16 +3,16 @@
 use rayon::prelude::*;
 
 use super::graph::Quad;
-use super::poisson::{Data, Weights};
+use super::poisson::{Targets, Weights};
 
-/// How the iteration runs.
+/// Parameters of the iteration.
 #[derive(Clone, Copy, Debug)]
 pub struct Options {
     /// Least squares problems that are solved, the first with all weights 1.
     pub iterations: u32,
-    /// Residual below which the norm is rounded off, in the second problem.
+    /// Residual below which the norm is smoothed, in the second problem.
     pub epsilon: f32,
-    /// What it is multiplied by from problem to problem.
+    /// Factor of epsilon from one problem to the next.
     pub decay: f32,
 }
 
@@ -28,28 +28,24 @@ const TOLERANCE: f64 = 0.1;
 /// Weights are at most one over this.
 const LEAST: f32 = 1e-7;
 
-/// Minimises Σ α |u - data| + Σ |Dx u - dx| + Σ |Dy u - dy|, where |.| is the length of a colour. Edges whose `kept`
-/// is zero are left out.
-pub fn solve(data: Data, kept: [&[f32]; 2], alpha: f32, options: Options) -> Vec<Quad> {
-    let nodes = data.data.len();
-    let mut u = data.data.to_vec();
+/// Minimises Σ α |u - data| + Σ kept |u(higher) - u(lower) - difference|, where |.| is the length of a colour and `kept`
+/// is one for every edge that counts, or zero.
+pub fn solve(targets: Targets, kept: &[f32], alpha: f32, options: Options) -> Vec<Quad> {
+    let Targets { edges, data, differences } = targets;
+    let mut u = data.to_vec();
     for k in 0..options.iterations {
         let epsilon = (options.epsilon * options.decay.powi(k as i32 - 1)).max(LEAST);
         let weight = |length: f32| if k == 0 { 1.0 } else { 1.0 / (length + epsilon) };
-        let along = |axis: usize, step: usize| -> Vec<f32> {
-            let residual = |i: usize| match u.get(i + step) {
-                Some(next) => length(|c| next[c] - u[i][c] - data.edges[axis][i][c]),
-                None => 0.0,
-            };
-            (0..nodes).into_par_iter().map(|i| kept[axis][i] * weight(residual(i))).collect()
+        let of_edge = |edge: usize| {
+            let [lower, higher] = edges.ends(edge);
+            kept[edge] * weight(length(|c| u[higher][c] - u[lower][c] - differences[edge][c]))
         };
-        let own = |i: usize| alpha * alpha * weight(alpha * length(|c| u[i][c] - data.data[i][c]));
+        let of_pixel = |i: usize| alpha * alpha * weight(alpha * length(|c| u[i][c] - data[i][c]));
         let weights = Weights {
-            across: along(0, 1),
-            down: along(1, data.width),
-            screen: (0..nodes).into_par_iter().map(own).collect(),
+            edges: (0..edges.len()).into_par_iter().map(of_edge).collect(),
+            screen: (0..data.len()).into_par_iter().map(of_pixel).collect(),
         };
-        u = weights.solver(data.width).solve(&weights.right(data), u, TOLERANCE).x;
+        u = weights.solver(edges).solve(&weights.rhs(targets), u, TOLERANCE).x;
     }
     u
 }

@@ -264,6 +264,7 @@ fn dot(x: &[Quad], y: &[Quad]) -> [f64; 4] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::film::Edges;
     use crate::math::rng::{combine, unit};
 
     fn random(seed: u64, i: usize) -> f32 {
@@ -277,7 +278,10 @@ mod tests {
         let weight = |seed: u64, i: usize| 10f32.powf(decades * (0.7 * patch(i) + 0.3 * random(seed, i) - 0.5));
         let across: Vec<f32> = (0..n).map(|i| weight(1, i)).collect();
         let down: Vec<f32> = (0..n).map(|i| weight(2, i)).collect();
-        Graph::from_grid(width, &across, &down, &vec![screen; n])
+        let edges = Edges::cross((width, height));
+        let of_edge = |edge: usize| [&across, &down][edges.kind(edge)][edges.ends(edge)[0]];
+        let weights: Vec<f32> = (0..edges.len()).map(of_edge).collect();
+        Graph::new(&edges, &weights, &vec![screen; n])
     }
 
     fn noise(n: usize, seed: u64) -> Vec<Quad> {

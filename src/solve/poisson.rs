@@ -1,4 +1,4 @@
-//! The screened Poisson equation, with constant coefficients and with a weight for every edge and pixel.
+//! The screened Poisson equation: with constant coefficients on a grid, and with a weight for every edge and pixel.
 
 use std::f64::consts::PI;
 
@@ -7,15 +7,16 @@ use rayon::prelude::*;
 use super::dct::Dct2;
 use super::graph::{Graph, Quad};
 use super::multigrid::Multigrid;
+use crate::film::Edges;
 
 /// Solves min |α (u - data)|² + |Dx u - dx|² + |Dy u - dy|² exactly. Images are rows of `width`; the last column
 /// of `dx` and the last row of `dy` are no edges and are not read. Needs α > 0.
 pub fn screened(width: usize, data: &[f64], dx: &[f64], dy: &[f64], alpha: f64) -> Vec<f64> {
     let height = data.len() / width;
     let screen = alpha * alpha;
-    let mut right = vec![0.0; data.len()];
+    let mut rhs = vec![0.0; data.len()];
     // α² data + Dxᵀ dx + Dyᵀ dy, each edge seen from both of its ends.
-    right.par_chunks_exact_mut(width).enumerate().for_each(|(y, row)| {
+    rhs.par_chunks_exact_mut(width).enumerate().for_each(|(y, row)| {
         for (x, slot) in row.iter_mut().enumerate() {
             let i = y * width + x;
             let mut sum = screen * data[i];
@@ -25,69 +26,63 @@ pub fn screened(width: usize, data: &[f64], dx: &[f64], dy: &[f64], alpha: f64) 
         }
     });
     let dct = Dct2::new(width, height);
-    dct.forward(&mut right);
+    dct.forward(&mut rhs);
     // Differences leave the mean to the data. Of the sum above only rounding would be left if the screen is weak, and it
     // would be divided by the screen.
-    right[0] = screen * data.iter().sum::<f64>();
+    rhs[0] = screen * data.iter().sum::<f64>();
     let eigenvalues = |n: usize| (0..n).map(move |k| 4.0 * (PI * k as f64 / (2 * n) as f64).sin().powi(2));
     let across: Vec<f64> = eigenvalues(width).collect();
     let down: Vec<f64> = eigenvalues(height).collect();
-    right.par_chunks_exact_mut(width).zip(&down).for_each(|(row, vertical)| {
+    rhs.par_chunks_exact_mut(width).zip(&down).for_each(|(row, vertical)| {
         row.iter_mut().zip(&across).for_each(|(value, horizontal)| *value /= screen + horizontal + vertical);
     });
-    dct.inverse(&mut right);
-    right
+    dct.inverse(&mut rhs);
+    rhs
 }
 
-/// Weights of a problem: min Σ screen |u - data|² + Σ across |Dx u - dx|² + Σ down |Dy u - dy|².
+/// Weights of a weighted problem: min Σ screen |u - data|² + Σ weight |u(higher) - u(lower) - difference|².
 pub struct Weights {
-    /// Of the differences to the right.
-    pub across: Vec<f32>,
-    /// Of the differences downwards.
-    pub down: Vec<f32>,
-    /// Of the data.
+    /// Weight of every edge's difference.
+    pub edges: Vec<f32>,
+    /// Weight of every pixel's value.
     pub screen: Vec<f32>,
 }
 
-/// What [`Weights`] weigh: rows of `width` pixels of up to four channels.
+/// An image and differences that a solution is to come near, in up to four channels.
 #[derive(Clone, Copy)]
-pub struct Data<'a> {
-    /// Pixels in a row.
-    pub width: usize,
-    /// The image.
+pub struct Targets<'a> {
+    /// The pairs of pixels between which differences are known.
+    pub edges: &'a Edges,
+    /// Value of every pixel.
     pub data: &'a [Quad],
-    /// Its differences to the right and downwards; the last column and row, which are no edges, are not read.
-    pub edges: [&'a [Quad]; 2],
+    /// Difference "higher end minus lower end" of every edge.
+    pub differences: &'a [Quad],
 }
 
 impl Weights {
     /// Right-hand side of the normal equations.
-    pub fn right(&self, Data { width, data, edges: [dx, dy] }: Data) -> Vec<Quad> {
-        let nodes = data.len();
-        let value = |i: usize| {
-            let mut sum = data[i].map(|value| self.screen[i] * value);
-            let mut add = |there: bool, weights: &[f32], edges: &[Quad], at: usize, sign: f32| {
-                if there {
-                    (0..4).for_each(|c| sum[c] += sign * weights[at] * edges[at][c]);
-                }
-            };
-            add(!i.is_multiple_of(width), &self.across, dx, i.wrapping_sub(1), 1.0);
-            add(!(i + 1).is_multiple_of(width), &self.across, dx, i, -1.0);
-            add(i >= width, &self.down, dy, i.wrapping_sub(width), 1.0);
-            add(i + width < nodes, &self.down, dy, i, -1.0);
+    pub fn rhs(&self, targets: Targets) -> Vec<Quad> {
+        let Targets { edges, data, differences } = targets;
+        let value = |pixel: usize| {
+            let mut sum = data[pixel].map(|value| self.screen[pixel] * value);
+            for half in edges.around(pixel) {
+                // A difference towards this pixel adds to it.
+                let weight = -half.sign * self.edges[half.edge];
+                (0..4).for_each(|c| sum[c] += weight * differences[half.edge][c]);
+            }
             sum
         };
-        (0..nodes).into_par_iter().map(value).collect()
+        (0..data.len()).into_par_iter().map(value).collect()
     }
 
     /// The solver of the normal equations.
-    pub fn solver(&self, width: usize) -> Multigrid {
-        Multigrid::new(self.graph(width))
+    pub fn solver(&self, edges: &Edges) -> Multigrid {
+        Multigrid::new(self.graph(edges))
     }
 
     /// The matrix of the normal equations.
-    pub fn graph(&self, width: usize) -> Graph {
-        Graph::from_grid(width, &self.across, &self.down, &self.screen)
+    pub fn graph(&self, edges: &Edges) -> Graph {
+        Graph::new(edges, &self.edges, &self.screen)
     }
 }
 

@@ -1,14 +1,13 @@
 //! Frames that no method likes.
 
-use super::frame::{
-    COLOR, KINDS, SIZE, average, change, exact, expose, farthest, flat, methods, mse, names, noisy, not_finite,
-    picture, random, run,
-};
+use super::frame::{COLOR, SIZE, average, denoisers, farthest, methods, mse, names, noisy, not_finite, run};
 use super::{Case, Checks};
 use crate::error::Result;
 use crate::film::{BINS, Frame, Layer};
 use crate::image::Image;
 use crate::math::vec3;
+use crate::reconstruct::EdgeTrust;
+use crate::synthetic::{SAMPLED, change, exact, expose, flat, picture, random};
 
 pub const CASES: &[Case] = &[
     Case { name: "frames/black", summary: "nothing but zeros stays zero", run: black },
@@ -61,12 +60,6 @@ fn sizes(checks: &mut Checks) -> Result<()> {
     Ok(())
 }
 
-/// Methods that know from variances or from neighbours that a pixel cannot be trusted. The others take least squares of
-/// what they are given, or a few steps from there: a share of the firefly goes into what is around it.
-fn is_robust(id: &str) -> bool {
-    matches!(id, "control_variate" | "nlm" | "rdfc" | "frgr" | "apr")
-}
-
 fn firefly(checks: &mut Checks) -> Result<()> {
     let truth = flat(SIZE, 1.0);
     let mut frame = noisy(&truth, 1.0, 1);
@@ -83,15 +76,14 @@ fn firefly(checks: &mut Checks) -> Result<()> {
         let row = |i: usize| (i / 3 / SIZE.0).abs_diff(23);
         let far = solution.image.data.iter().enumerate().filter(|&(i, _)| column(i).max(row(i)) > 16);
         let apart = far.map(|(_, &value)| f64::from((value - 1.0).abs())).fold(0.0, f64::max);
-        match method.id {
-            "l2" => {
-                let kept = (average(&solution.image) / color - 1.0).abs();
-                checks.add(method.id, "change of the mean", kept, 1e-4);
-            }
-            id if is_robust(id) => {
-                checks.add(id, "largest error beyond 16 pixels", apart, 4.0 * f64::from(COLOR));
-            }
-            id => checks.add(id, "largest error beyond 16 pixels, of the firefly", apart / 1e8, 1e-3),
+        if method.traits.keeps_mean {
+            let kept = (average(&solution.image) / color - 1.0).abs();
+            checks.add(method.id, "change of the mean", kept, 1e-4);
+        } else if method.traits.robust {
+            checks.add(method.id, "largest error beyond 16 pixels", apart, 4.0 * f64::from(COLOR));
+        } else {
+            // Least squares, or a few steps from there: a share of the firefly goes into the pixels around it.
+            checks.add(method.id, "largest error beyond 16 pixels, of the firefly", apart / 1e8, 1e-3);
         }
     }
     Ok(())
@@ -106,7 +98,7 @@ fn unlit(checks: &mut Checks) -> Result<()> {
         change(&mut frame, layer, |i, value| if unlit(i) { 0.0 } else { value });
     }
     let before = frame.require(Layer::Color)?.clone();
-    for method in methods().filter(|method| method.id != "primal") {
+    for method in denoisers() {
         let solution = run(method, &frame)?;
         checks.add(method.id, FINITE, not_finite(&solution), 0.0);
         checks.add(method.id, GAIN, mse(&solution.image, &truth) / mse(&before, &truth), 1.0);
@@ -149,14 +141,11 @@ fn wild_edges(checks: &mut Checks) -> Result<()> {
     for method in methods() {
         let solution = run(method, &frame)?;
         checks.add(method.id, FINITE, not_finite(&solution), 0.0);
-        match method.id {
-            // These believe differences whatever their variances.
-            "l1" | "least_trimmed" | "control_variate" => {}
-            "l2" => {
-                let kept = (average(&solution.image) - average(&before)).abs() / 1e6;
-                checks.add(method.id, "change of the mean, of the differences", kept, 1e-6);
-            }
-            _ => checks.add(method.id, GAIN, mse(&solution.image, &truth) / mse(&before, &truth), 1.0),
+        if method.traits.keeps_mean {
+            let kept = (average(&solution.image) - average(&before)).abs() / 1e6;
+            checks.add(method.id, "change of the mean, of the differences", kept, 1e-6);
+        } else if method.traits.edges != EdgeTrust::Always {
+            checks.add(method.id, GAIN, mse(&solution.image, &truth) / mse(&before, &truth), 1.0);
         }
     }
     Ok(())
@@ -171,8 +160,7 @@ fn exposure(checks: &mut Checks) -> Result<()> {
             expose(&mut scaled, factor);
             let mut image = run(method, &scaled)?.image;
             image.data.iter_mut().for_each(|value| *value /= factor);
-            // In `apr` rounding may decide whether a monomial is new in a window.
-            let bound = if method.id == "apr" { 1e-2 } else { 1e-3 };
+            let bound = f64::from(method.traits.exposure_tolerance);
             checks.add(format!("{} {factor:.0e}", method.id), FARTHEST, farthest(&image, &normal), bound);
         }
     }
@@ -252,7 +240,7 @@ fn features(checks: &mut Checks) -> Result<()> {
             [Layer::Albedo, Layer::Normal].iter().for_each(|&layer| change(frame, layer, |i, _| lies(i)))
         }),
     ];
-    for method in methods().filter(|method| method.id != "primal") {
+    for method in denoisers() {
         for (kind, make) in &kinds {
             let mut frame = frame.clone();
             make(&mut frame);
@@ -274,7 +262,7 @@ fn few(checks: &mut Checks) -> Result<()> {
             let bins = [Layer::BinColor(k), Layer::BinDx(k), Layer::BinDy(k)];
             bins.into_iter().for_each(|layer| change(&mut frame, layer, |_, _| 0.0));
         }
-        for (whole, variance, bin) in KINDS {
+        for (whole, variance, bin) in SAMPLED {
             let bins: Vec<Vec<f32>> =
                 (0..spp as u8).map(|k| frame.require(bin(k)).map(|image| image.data.clone())).collect::<Result<_>>()?;
             let mean = |i: usize| bins.iter().map(|bin| bin[i]).sum::<f32>() / spp as f32;
@@ -283,7 +271,7 @@ fn few(checks: &mut Checks) -> Result<()> {
             change(&mut frame, variance, |i, _| if spp == 1 { mean(i).powi(2) } else { square(i) });
         }
         let before = frame.require(Layer::Color)?.clone();
-        for method in methods().filter(|method| method.id != "primal") {
+        for method in denoisers() {
             let solution = run(method, &frame)?;
             let subject = format!("{} {spp} spp", method.id);
             checks.add(subject.clone(), FINITE, not_finite(&solution), 0.0);
@@ -300,10 +288,10 @@ fn missing(checks: &mut Checks) -> Result<()> {
         let needs = made.needs();
         let lost: Vec<Layer> = [
             (true, Layer::Color),
-            (needs.edges, Layer::Dx),
-            (needs.edges, Layer::DyVariance),
+            (needs.edges.is_on(), Layer::Dx),
+            (needs.edges.is_on(), Layer::DyVariance),
             (needs.bins, Layer::BinColor(3)),
-            (needs.bins && needs.edges, Layer::BinDx(7)),
+            (needs.bins && needs.edges.is_on(), Layer::BinDx(7)),
             (needs.features, Layer::Normal),
         ]
         .into_iter()

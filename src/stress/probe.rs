@@ -3,12 +3,11 @@
 use std::sync::atomic::AtomicBool;
 
 use super::Checks;
-use super::frame::{QUIET, average, not_finite};
+use super::frame::{average, not_finite};
 use crate::error::Result;
 use crate::film::{Film, Frame, Layer, Needs};
-use crate::reconstruct::{parse, solve};
-use crate::render::gradient::shift::{SHIFTS, Shift};
-use crate::render::{Budget, Control, Settings, render};
+use crate::reconstruct::{Context, parse, solve};
+use crate::render::{Budget, Control, RenderSettings, SHIFTS, Shift, render};
 use crate::scene::{Scene, load};
 
 /// Size of the images: more than one tile, and one that is cut off.
@@ -55,8 +54,8 @@ pub fn sky(radiance: f32) -> String {
     format!(r#"<emitter type="constant"><rgb name="radiance" value="{radiance}"/></emitter>"#)
 }
 
-/// A glow of a shape.
-pub fn glow(radiance: f32) -> String {
+/// An area emitter, to be nested in a shape.
+pub fn area_emitter(radiance: f32) -> String {
     format!(r#"<emitter type="area"><rgb name="radiance" value="{radiance:e}"/></emitter>"#)
 }
 
@@ -79,8 +78,8 @@ impl Probe {
     }
 
     fn film(&self, run: u64, needs: Needs, shift: Shift) -> Film {
-        let settings = Settings { budget: Budget::Spp(self.spp), seed: run, first: 0, needs, shift };
-        let control = Control { stop: &AtomicBool::new(false), progress: &|_| {}, keeper: None };
+        let settings = RenderSettings { budget: Budget::Spp(self.spp), seed: run, first: 0, needs, shift };
+        let control = Control { stop: &AtomicBool::new(false), progress: &|_| {}, sink: None };
         render(&self.scene, settings, &control).film
     }
 
@@ -95,15 +94,16 @@ impl Probe {
         let means = self.means();
         let mean = means.iter().sum::<f64>() / RUNS as f64;
         checks.add(format!("{subject}, path"), "departure of the mean", (mean / expected - 1.0).abs(), bound);
-        let needs = Needs { features: true, edges: true, ..Needs::default() };
-        for (name, shift, _) in SHIFTS {
-            let films: Vec<Film> = (0..RUNS).map(|run| self.film(100 + run, needs, *shift)).collect();
+        let needs = Needs { features: true, ..Needs::EDGES };
+        for name in SHIFTS.iter().map(|kind| kind.id) {
+            let shift = Shift::named(name).unwrap_or_default();
+            let films: Vec<Film> = (0..RUNS).map(|run| self.film(100 + run, needs, shift)).collect();
             let rejected: u64 = films.iter().map(Film::rejected).sum();
             checks.add(format!("{subject}, {name}"), "samples rejected", rejected as f64, 0.0);
             let frames: Vec<Frame> = films.iter().map(Film::develop).collect();
             checks.add(format!("{subject}, {name}"), "bias of differences, in deviations", bias(&frames), 8.0);
-            if *shift == Shift::default() {
-                let solution = solve(parse("frgr")?.as_ref(), &frames[0], &QUIET)?;
+            if shift == Shift::default() {
+                let solution = solve(parse("frgr")?.as_ref(), &frames[0], &Context::QUIET)?;
                 checks.add(format!("{subject}, frgr"), "values not finite", not_finite(&solution), 0.0);
                 // A filter that weighs by variances may lose some of what a few samples found.
                 let totals: Vec<f64> = frames.iter().map(total).collect();

@@ -3,7 +3,7 @@
 use std::f32::consts::PI;
 use std::fmt::Write;
 
-use super::probe::{Probe, camera, glow, grey, sky, square};
+use super::probe::{Probe, area_emitter, camera, grey, sky, square};
 use super::{Case, Checks};
 use crate::error::Result;
 
@@ -30,7 +30,7 @@ pub const CASES: &[Case] = &[
     Case { name: "scenes/million", summary: "a million emitters instead of one", run: million },
     Case { name: "scenes/depth", summary: "paths of one edge, and of ten thousand", run: depth },
     Case { name: "scenes/corridor", summary: "light after ten mirrors, and after ten bounces", run: corridor },
-    Case { name: "scenes/mirrors", summary: "a room of mirrors that glow", run: mirrors },
+    Case { name: "scenes/mirrors", summary: "a room of mirrors that area_emitter", run: mirrors },
 ];
 
 /// The irradiance that a small emitter of radiance one, an area of `area` at distance `d` straight above, makes.
@@ -48,7 +48,7 @@ fn lit_floor(unit: f32, at: f32, width: f32) -> Result<(Probe, f64)> {
     let elements = [
         camera(&point(eye), &point(place(0.0)), 0.5),
         square(place(0.0), [0.0, 1.0, 0.0], width * unit, &grey(0.5)),
-        square(place(2.0), [0.0, -1.0, 0.0], 0.2 * unit, &glow(1.0)),
+        square(place(2.0), [0.0, -1.0, 0.0], 0.2 * unit, &area_emitter(1.0)),
     ];
     // Closed form of a square above a point, to second order in its size.
     let exact = below(0.04, 2.0) * (1.0 - 4.0 / 6.0 * 0.02 / 4.0 * 2.0) * 0.5 / f64::from(PI);
@@ -82,7 +82,7 @@ fn large(checks: &mut Checks) -> Result<()> {
 fn unequal(checks: &mut Checks) -> Result<()> {
     // Two floors with a wall between them and a lamp above each.
     for (name, side) in [("the dim room", -1.0f32), ("the bright room", 1.0)] {
-        let (dim, bright) = (glow(1e-6), glow(1e9));
+        let (dim, bright) = (area_emitter(1e-6), area_emitter(1e9));
         let elements = [
             camera(&format!("{},1,1", 5.0 * side), &format!("{},0,0", 5.0 * side), 0.5),
             square([0.0, 0.0, 0.0], [0.0, 1.0, 0.0], 40.0, &grey(0.5)),
@@ -149,7 +149,7 @@ fn threshold(checks: &mut Checks) -> Result<()> {
             camera("0,2,2", "0,0,0", 20.0),
             square([0.0; 3], [0.0, 1.0, 0.0], 10.0, &metal),
             // Its mirror image begins at the middle of the view and is wider than it.
-            square([10.0, 10.0, -10.0], [0.0, 0.0, 1.0], 20.0, &glow(1.0)),
+            square([10.0, 10.0, -10.0], [0.0, 0.0, 1.0], 20.0, &area_emitter(1.0)),
         ];
         Probe::new(&elements, 4, 64)?.check(checks, &format!("roughness {alpha}"), 0.5, 0.02)?;
     }
@@ -166,7 +166,7 @@ fn coincident(checks: &mut Checks) -> Result<()> {
         1.0,
         0.01,
     )?;
-    let lamp = format!("{}{}", white, glow(1.0));
+    let lamp = format!("{}{}", white, area_emitter(1.0));
     // Whichever lies on top, the light is at least that of one.
     Probe::new(&[seen.clone(), floor(&lamp), floor(&lamp)], 1, 16)?.check(checks, "lamp on lamp", 1.0, 0.01)?;
     let glass = r#"<bsdf type="thindielectric"/>"#;
@@ -232,8 +232,11 @@ fn inside(checks: &mut Checks) -> Result<()> {
 fn million(checks: &mut Checks) -> Result<()> {
     let floor = square([0.0; 3], [0.0, 1.0, 0.0], 20.0, &grey(0.5));
     let view = camera("0,1,2", "0,0,0", 10.0);
-    let one =
-        Probe::new(&[view.clone(), floor.clone(), square([0.0, 2.0, 0.0], [0.0, -1.0, 0.0], 2.0, &glow(1.0))], 2, 64)?;
+    let one = Probe::new(
+        &[view.clone(), floor.clone(), square([0.0, 2.0, 0.0], [0.0, -1.0, 0.0], 2.0, &area_emitter(1.0))],
+        2,
+        64,
+    )?;
     let means = one.means();
     let expected = means.iter().sum::<f64>() / means.len() as f64;
     for side in [100usize, 1000] {
@@ -256,11 +259,11 @@ fn million(checks: &mut Checks) -> Result<()> {
     Ok(())
 }
 
-/// The inside of a cube of side two whose walls glow with one and reflect.
+/// The inside of a cube of side two whose walls area_emitter with one and reflect.
 fn cube(material: &str) -> String {
     let walls =
         [[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, -1.0]];
-    let inside = format!("{material}{}", glow(1.0));
+    let inside = format!("{material}{}", area_emitter(1.0));
     walls.iter().map(|wall| square(wall.map(|x: f32| -x), *wall, 2.0, &inside)).collect()
 }
 
@@ -270,7 +273,7 @@ fn depth(checks: &mut Checks) -> Result<()> {
     Probe::new(&[view.clone(), cube(&grey(0.9))], 2, 64)?.check(checks, "two edges", 1.9, 0.01)?;
     // Rooms in which light is reflected a hundred times on average: one without edges, and one whose walls meet. Rays
     // start a little off their surfaces, which next to an edge is beyond the other wall.
-    let inside = format!("{}{}", grey(0.99), glow(1.0));
+    let inside = format!("{}{}", grey(0.99), area_emitter(1.0));
     Probe::new(&[view.clone(), ball(0.0, 1.0, &format!("{FLIPPED}{inside}"))], 10_000, 16)?.check(
         checks,
         "ten thousand edges",
@@ -302,7 +305,7 @@ fn corridor(checks: &mut Checks) -> Result<()> {
         camera("0,0,0", "1,1,0", 1.0),
         square([1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], 39.0, mirror),
         square([-1.0, 0.0, 0.0], [1.0, 0.0, 0.0], 39.0, mirror),
-        square([0.0, 20.0, 0.0], [0.0, -1.0, 0.0], 10.0, &glow(1.0)),
+        square([0.0, 20.0, 0.0], [0.0, -1.0, 0.0], 10.0, &area_emitter(1.0)),
     ];
     // Heights of 1, 3, ... 19 after ten reflections.
     Probe::new(&elements, 20, 16)?.check(checks, "mirrors", 0.8f64.powi(10), 0.01)?;
@@ -321,7 +324,7 @@ fn corridor(checks: &mut Checks) -> Result<()> {
             parts.push(square(wall.map(|x: f32| -x), wall, 24.0, &grey(0.9)));
         }
         parts.push(square([0.0, -0.5, 0.0], [0.0, 1.0, 0.0], 2.0, &grey(0.9)));
-        parts.push(square([0.0, 11.0, 0.0], [0.0, -1.0, 0.0], 2.0, &glow(radiance)));
+        parts.push(square([0.0, 11.0, 0.0], [0.0, -1.0, 0.0], 2.0, &area_emitter(radiance)));
         Probe::new(&parts, 100, 64)
     };
     let means = tower(1.0)?.means();

@@ -1,11 +1,11 @@
 //! Stiff systems, against direct solutions in double precision and conditions of optimality.
 
-use super::frame::random;
-use super::systems::Problem;
+use super::systems::System;
 use super::{Case, Checks};
 use crate::error::Result;
 use crate::solve::poisson::{Weights, screened};
 use crate::solve::{irls, simplex};
+use crate::synthetic::random;
 
 pub const CASES: &[Case] = &[
     Case { name: "solvers/screening", summary: "Poisson by cosines, screens from 1e-8 to 1e8", run: screening },
@@ -24,15 +24,16 @@ pub const CASES: &[Case] = &[
 ];
 
 fn screening(checks: &mut Checks) -> Result<()> {
-    let problem = Problem::new(12, 9, 1);
-    let (n, list) = (108, |values: &[[f32; 4]]| values.iter().map(|quad| f64::from(quad[0])).collect::<Vec<_>>());
-    let (data, dx, dy) = (list(&problem.data), list(&problem.edges[0]), list(&problem.edges[1]));
+    let system = System::new(12, 9, 1);
+    let n = system.data.len();
+    let data: Vec<_> = system.data.iter().map(|quad| f64::from(quad[0])).collect();
+    let (dx, dy) = (system.grid(0), system.grid(1));
     for exponent in [-8, -4, 0, 4, 8] {
         let alpha = 10f64.powi(exponent);
         let u = screened(12, &data, &dx, &dy, alpha);
         // The mean is all that weak screens decide: it is compared apart.
         let mean = |u: &[f64]| u.iter().sum::<f64>() / n as f64;
-        let exact = problem.solve(&vec![alpha * alpha; n], &vec![1.0; n], &vec![1.0; n]);
+        let exact = system.solve(&vec![alpha * alpha; n], &vec![1.0; system.edges.len()]);
         let (shift, largest) = (mean(&u) - mean(&exact), exact.iter().fold(1.0, |most: f64, x| most.max(x.abs())));
         let apart = u.iter().zip(&exact).map(|(u, exact)| (u - exact - shift).abs()).fold(0.0, f64::max);
         checks.add(format!("alpha {alpha:.0e}"), "largest error", apart / largest, 1e-9);
@@ -42,26 +43,28 @@ fn screening(checks: &mut Checks) -> Result<()> {
 }
 
 /// Solves in single precision; the excess over the least cost, as a share of what the data themselves cost.
-fn excess(problem: &Problem, weights: &Weights) -> f64 {
+fn excess(system: &System, weights: &Weights) -> f64 {
     let wide = |values: &[f32]| values.iter().map(|&value| f64::from(value)).collect::<Vec<_>>();
-    let exact = problem.solve(&wide(&weights.screen), &wide(&weights.across), &wide(&weights.down));
-    let found = weights.solver(problem.width).solve(&weights.right(problem.data()), problem.data.clone(), 1e-5).x;
+    let exact = system.solve(&wide(&weights.screen), &wide(&weights.edges));
+    let found = weights.solver(&system.edges).solve(&weights.rhs(system.targets()), system.data.clone(), 1e-5).x;
     let found: Vec<_> = found.iter().map(|quad| f64::from(quad[0])).collect();
-    let start: Vec<_> = problem.data.iter().map(|quad| f64::from(quad[0])).collect();
-    let [least, cost, before] = [&exact, &found, &start].map(|u| problem.cost(weights, u, 2));
+    let start: Vec<_> = system.data.iter().map(|quad| f64::from(quad[0])).collect();
+    let [least, cost, before] = [&exact, &found, &start].map(|u| system.cost(weights, u, 2));
     (cost - least) / before
 }
 
 fn weighted(checks: &mut Checks) -> Result<()> {
     for (width, height) in [(8, 7), (24, 20)] {
         for exponent in [0, 4, 8, 12, 16] {
-            let problem = Problem::new(width, height, 2);
-            let weight = |seed: u64| {
-                (0..width * height).map(|i| 10f32.powf(exponent as f32 * (random(seed, i) - 0.5))).collect()
+            let system = System::new(width, height, 2);
+            let weight = |seed: u64, i: usize| 10f32.powf(exponent as f32 * (random(seed, i) - 0.5));
+            let edges = &system.edges;
+            let weights = Weights {
+                edges: (0..edges.len()).map(|e| weight(11 + edges.kind(e) as u64, edges.ends(e)[0])).collect(),
+                screen: (0..width * height).map(|i| weight(13, i)).collect(),
             };
-            let weights = Weights { across: weight(11), down: weight(12), screen: weight(13) };
             let subject = format!("{width}x{height}, 1e{exponent}");
-            checks.add(subject, "excess cost, of that before", excess(&problem, &weights), 1e-5);
+            checks.add(subject, "excess cost, of that before", excess(&system, &weights), 1e-5);
         }
     }
     Ok(())
@@ -70,36 +73,38 @@ fn weighted(checks: &mut Checks) -> Result<()> {
 fn islands(checks: &mut Checks) -> Result<()> {
     let (width, height) = (24, 20);
     for exponent in [4, 8, 12, 16] {
-        let problem = Problem::new(width, height, 3);
+        let system = System::new(width, height, 3);
         let (strong, weak) = (10f32.powi(exponent / 2), 10f32.powi(-exponent / 2));
         let at = |i: usize| (i % width, i / width);
-        let across = |i: usize| if at(i).0 % 8 == 7 { weak } else { strong };
-        let down = |i: usize| if at(i).1 % 5 == 4 { weak } else { strong };
-        let all = 0..width * height;
-        let weights = Weights {
-            across: all.clone().map(across).collect(),
-            down: all.clone().map(down).collect(),
-            // One pixel of each island says where it is.
-            screen: all.map(|i| if at(i).0 % 8 == 3 && at(i).1 % 5 == 2 { 1.0 } else { weak }).collect(),
+        let crosses = |edge: usize| {
+            let (x, y) = at(system.edges.ends(edge)[0]);
+            if system.edges.kind(edge) == 0 { x % 8 == 7 } else { y % 5 == 4 }
         };
-        checks.add(format!("1e{exponent}"), "excess cost, of that before", excess(&problem, &weights), 1e-6);
+        let weights = Weights {
+            edges: (0..system.edges.len()).map(|edge| if crosses(edge) { weak } else { strong }).collect(),
+            // One pixel of each island determines its level.
+            screen: (0..width * height)
+                .map(|i| if at(i).0 % 8 == 3 && at(i).1 % 5 == 2 { 1.0 } else { weak })
+                .collect(),
+        };
+        checks.add(format!("1e{exponent}"), "excess cost, of that before", excess(&system, &weights), 1e-6);
     }
     Ok(())
 }
 
 fn reweighted(checks: &mut Checks) -> Result<()> {
     for (seed, scale) in [(4, 1.0f32), (5, 1e-3), (6, 1e3)] {
-        let mut problem = Problem::new(14, 11, seed);
-        let all = problem.data.iter_mut().chain(problem.edges.iter_mut().flatten());
+        let mut system = System::new(14, 11, seed);
+        let all = system.data.iter_mut().chain(&mut system.differences);
         all.for_each(|quad| quad[0] *= scale);
         // Rounded off at a share of the values, as the methods do by working on images of mean one.
         let options = irls::Options { iterations: 40, epsilon: 0.05 * scale, decay: 0.7 };
-        let (n, alpha) = (problem.data.len(), 0.3);
-        let ones = vec![1.0; n];
-        let found = irls::solve(problem.data(), [&ones, &ones], alpha, options);
+        let (n, alpha) = (system.data.len(), 0.3);
+        let ones = vec![1.0; system.edges.len()];
+        let found = irls::solve(system.targets(), &ones, alpha, options);
         let found: Vec<_> = found.iter().map(|quad| f64::from(quad[0])).collect();
-        let unit = Weights { across: vec![1.0; n], down: vec![1.0; n], screen: vec![alpha; n] };
-        let [cost, least] = [found, problem.solve_l1(f64::from(alpha))].map(|u| problem.cost(&unit, &u, 1));
+        let unit = Weights { edges: ones, screen: vec![alpha; n] };
+        let [cost, least] = [found, system.solve_l1(f64::from(alpha))].map(|u| system.cost(&unit, &u, 1));
         checks.add(format!("values of {scale:.0e}"), "excess cost", cost / least - 1.0, 1e-2);
     }
     Ok(())

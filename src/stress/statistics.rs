@@ -1,10 +1,10 @@
 //! Films fed by hand.
 
-use super::frame::random;
 use super::{Case, Checks};
 use crate::error::Result;
-use crate::film::{Film, Frame, Layer, Needs, Sample};
+use crate::film::{Differences, Film, Frame, Layer, Needs, Sample};
 use crate::math::Rgb;
+use crate::synthetic::random;
 
 pub const CASES: &[Case] = &[
     Case {
@@ -34,12 +34,15 @@ fn samples(checks: &mut Checks) -> Result<()> {
             ("color", |sample, bad| sample.color.y = bad),
             ("direct", |sample, bad| sample.direct.y = bad),
             ("depth", |sample, bad| sample.features.depth = bad),
-            ("edges", |sample, bad| sample.edges[2].x = bad),
+            ("edges", |sample, bad| {
+                sample.differences.iter_mut().for_each(|differences| differences.color[2].x = bad);
+            }),
         ];
         for (field, set) in fields {
             let mut film = Film::new(1, 1, Needs::ALL);
             for i in 0..64 {
-                let mut sample = Sample { color: Rgb::splat(random(1, i)), ..Sample::default() };
+                let differences = Some(Differences::default());
+                let mut sample = Sample { color: Rgb::splat(random(1, i)), differences, ..Sample::default() };
                 if i == 20 {
                     set(&mut sample, bad);
                 }
@@ -89,7 +92,8 @@ fn merge(checks: &mut Checks) -> Result<()> {
         let mut film = Film::new(1, 1, Needs::ALL);
         for i in range {
             let color = Rgb::splat(random(3, i));
-            let sample = Sample { color, direct: color * 2.0, edges: [color; 4], ..Sample::default() };
+            let differences = Some(Differences { color: [color; 4], ..Differences::default() });
+            let sample = Sample { color, direct: color * 2.0, differences, ..Sample::default() };
             let _ = film.tiles_mut()[0].add(0, &sample);
         }
         film
@@ -106,7 +110,7 @@ fn merge(checks: &mut Checks) -> Result<()> {
             checks.add(format!("{} {order:?}", layer.name()), "departure from the whole", apart, 1e-6);
         }
         let bins = |frame: &Frame| {
-            let of_half = |first| frame.half(Layer::BinColor, first).map(|[mean, _]| f64::from(mean.data[0]));
+            let of_half = |first| frame.color_half(first).map(|[mean, _]| f64::from(mean.data[0]));
             Ok::<_, crate::error::Error>(0.5 * (of_half(0)? + of_half(1)?))
         };
         // Halves of the bins have half of the samples each, whatever was merged.

@@ -1,8 +1,9 @@
 //! Small systems solved directly in double precision: what iterative solvers in single precision are held against.
 
-use super::frame::random;
+use crate::film::Edges;
 use crate::solve::graph::Quad;
-use crate::solve::poisson::{Data, Weights};
+use crate::solve::poisson::{Targets, Weights};
+use crate::synthetic::random;
 
 /// Solves a symmetric positive definite system by Cholesky's method. `a` holds rows of the whole matrix.
 pub fn direct(mut a: Vec<f64>, mut x: Vec<f64>) -> Vec<f64> {
@@ -25,52 +26,60 @@ pub fn direct(mut a: Vec<f64>, mut x: Vec<f64>) -> Vec<f64> {
 }
 
 /// An image to be found from its values and differences: one channel of a weighted Poisson problem.
-pub struct Problem {
-    pub width: usize,
+pub struct System {
+    pub edges: Edges,
     pub data: Vec<Quad>,
-    pub edges: [Vec<Quad>; 2],
+    pub differences: Vec<Quad>,
 }
 
-impl Problem {
+impl System {
     /// Values and differences that contradict each other.
     pub fn new(width: usize, height: usize, seed: u64) -> Self {
-        let values = |k: u64| (0..width * height).map(|i| [random(seed + k, i) - 0.5, 0.0, 0.0, 0.0]).collect();
-        Self { width, data: values(1), edges: [values(2), values(3)] }
+        let value = |k: u64, i: usize| [random(seed + k, i) - 0.5, 0.0, 0.0, 0.0];
+        let edges = Edges::cross((width, height));
+        let of_edge = |edge: usize| value(2 + edges.kind(edge) as u64, edges.ends(edge)[0]);
+        let differences = (0..edges.len()).map(of_edge).collect();
+        Self { data: (0..width * height).map(|i| value(1, i)).collect(), differences, edges }
     }
 
-    pub fn data(&self) -> Data<'_> {
-        Data { width: self.width, data: &self.data, edges: [&self.edges[0], &self.edges[1]] }
+    pub fn targets(&self) -> Targets<'_> {
+        Targets { edges: &self.edges, data: &self.data, differences: &self.differences }
     }
 
-    /// Edges as pairs of pixels, with their differences and their places among the weights of an axis.
-    fn edges(&self) -> impl Iterator<Item = (usize, usize, f64, usize)> {
-        let n = self.data.len();
-        let at = move |axis: usize, i: usize, step: usize| (i, i + step, f64::from(self.edges[axis][i][0]), axis);
-        let across = (0..n).filter(move |i| (i + 1) % self.width != 0).map(move |i| at(0, i, 1));
-        let down = (0..n).filter(move |i| i + self.width < n).map(move |i| at(1, i, self.width));
-        across.chain(down)
+    /// Differences along an axis as a dense image, as the solver on grids takes them.
+    pub fn grid(&self, axis: usize) -> Vec<f64> {
+        let mut grid = vec![0.0; self.data.len()];
+        for edge in (0..self.edges.len()).filter(|&edge| self.edges.kind(edge) == axis) {
+            grid[self.edges.ends(edge)[0]] = f64::from(self.differences[edge][0]);
+        }
+        grid
+    }
+
+    /// Residual of an edge's difference.
+    fn residual(&self, u: &[f64], edge: usize) -> f64 {
+        let [lower, higher] = self.edges.ends(edge);
+        u[higher] - u[lower] - f64::from(self.differences[edge][0])
     }
 
     /// Σ weight |residual|^p over data and edges.
     pub fn cost(&self, weights: &Weights, u: &[f64], p: i32) -> f64 {
         let own =
             (0..u.len()).map(|i| f64::from(weights.screen[i]) * (u[i] - f64::from(self.data[i][0])).abs().powi(p));
-        let edge = |(i, j, d, axis): (usize, usize, f64, usize)| {
-            f64::from([&weights.across, &weights.down][axis][i]) * (u[j] - u[i] - d).abs().powi(p)
-        };
-        own.sum::<f64>() + self.edges().map(edge).sum::<f64>()
+        let of_edge = |edge: usize| f64::from(weights.edges[edge]) * self.residual(u, edge).abs().powi(p);
+        own.sum::<f64>() + (0..self.edges.len()).map(of_edge).sum::<f64>()
     }
 
     /// The least squares solution.
-    pub fn solve(&self, screen: &[f64], across: &[f64], down: &[f64]) -> Vec<f64> {
+    pub fn solve(&self, screen: &[f64], weights: &[f64]) -> Vec<f64> {
         let n = self.data.len();
         let (mut a, mut b) = (vec![0.0; n * n], vec![0.0; n]);
         for i in 0..n {
             a[i * n + i] += screen[i];
             b[i] += screen[i] * f64::from(self.data[i][0]);
         }
-        for (i, j, d, axis) in self.edges() {
-            let weight = [across, down][axis][i];
+        for (edge, &weight) in weights.iter().enumerate() {
+            let [i, j] = self.edges.ends(edge);
+            let d = f64::from(self.differences[edge][0]);
             a[i * n + i] += weight;
             a[j * n + j] += weight;
             a[i * n + j] -= weight;
@@ -81,7 +90,7 @@ impl Problem {
         direct(a, b)
     }
 
-    /// Minimises α Σ |u - data| + Σ |differences|, by reweighting until nothing changes.
+    /// Minimises α Σ |u - data| + Σ |residual of differences|, by reweighting until nothing changes.
     pub fn solve_l1(&self, alpha: f64) -> Vec<f64> {
         let n = self.data.len();
         let mut u: Vec<f64> = self.data.iter().map(|quad| f64::from(quad[0])).collect();
@@ -89,11 +98,9 @@ impl Problem {
             let epsilon = 0.05 * 0.8f64.powi(k).max(1e-9);
             let screen: Vec<_> =
                 (0..n).map(|i| alpha / ((u[i] - f64::from(self.data[i][0])).abs() + epsilon)).collect();
-            let mut weights = [vec![0.0; n], vec![0.0; n]];
-            for (i, j, d, axis) in self.edges() {
-                weights[axis][i] = 1.0 / ((u[j] - u[i] - d).abs() + epsilon);
-            }
-            u = self.solve(&screen, &weights[0], &weights[1]);
+            let weights: Vec<_> =
+                (0..self.edges.len()).map(|edge| 1.0 / (self.residual(&u, edge).abs() + epsilon)).collect();
+            u = self.solve(&screen, &weights);
         }
         u
     }

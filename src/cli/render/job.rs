@@ -3,44 +3,42 @@
 use std::time::Instant;
 
 use anyhow::Result;
-use fluxion::adaptive::{self, Begun, Limits};
-use fluxion::film::{Frame, Needs, exr};
+use fluxion::adaptive::{self, AdaptiveOutcome, AdaptiveSettings, Limits, Start};
+use fluxion::film::{Frame, Needs, Provenance, exr};
 use fluxion::image::io::failed_lookups;
-use fluxion::plan::Plan;
 use fluxion::reconstruct::{Reconstruction, Solution};
-use fluxion::render::{self, Budget, Control, Outcome, SampleId, Settings};
+use fluxion::render::{self, Budget, Control, RenderOutcome, RenderSettings, SampleId};
 use fluxion::scene::Scene;
 
 use super::{Args, shift};
-use crate::cli::checkpoint::Keeper;
+use crate::cli::checkpoint::CheckpointWriter;
 use crate::cli::stats::Stats;
 use crate::cli::{method, progress, stop_on_interrupt};
 
-/// What is asked for.
+/// A render with its options.
 pub struct Job<'a> {
     pub args: &'a Args,
     pub scene: &'a Scene,
     pub method: &'a dyn Reconstruction,
-    pub plan: &'a Plan,
-    pub keeper: Option<&'a Keeper<'a>>,
+    pub sink: Option<&'a CheckpointWriter<'a>>,
 }
 
-/// What a job leaves to be written.
-struct Made {
+/// Everything that is to be written.
+struct Rendered {
     frame: Frame,
     solution: Solution,
-    /// How saving the layers went: without them there is still an image.
+    /// The result of saving the layers, whose failure does not lose the image.
     layers: Result<()>,
 }
 
 impl Job<'_> {
     /// Renders, reconstructs and writes.
-    pub fn run(&self, begun: Begun, stats: &mut Stats) -> Result<()> {
+    pub fn run(&self, start: Start, stats: &mut Stats) -> Result<()> {
         let args = self.args;
-        let Made { frame, solution, layers } = if args.adaptive.is_some() || args.target_error.is_some() {
-            self.adaptive(begun, stats)?
+        let Rendered { frame, solution, layers } = if args.adaptive.is_some() || args.target_error.is_some() {
+            self.adaptive(start, stats)?
         } else {
-            self.straight(begun, stats)?
+            self.straight(start, stats)?
         };
         method::write(&args.output, &solution, &frame, stats)?;
         layers?;
@@ -50,47 +48,43 @@ impl Job<'_> {
         Ok(())
     }
 
-    fn settings(&self, needs: Needs, budget: Budget) -> Settings {
-        Settings { budget, seed: self.args.seed, first: self.args.first, needs, shift: shift(self.args) }
+    fn settings(&self, needs: Needs, budget: Budget) -> RenderSettings {
+        RenderSettings { budget, seed: self.args.seed, first: self.args.first, needs, shift: shift(self.args) }
     }
 
-    /// Does something long under a progress bar, until an interrupt stops it.
+    /// Runs something long under a progress bar; an interrupt stops it.
     fn controlled<T>(&self, work: impl FnOnce(&Control) -> Result<T>) -> Result<T> {
         let stop = stop_on_interrupt()?;
         let bar = progress::bar(self.args.quiet);
         bar.set_message("rendering");
         let report = |share| progress::set(&bar, share);
-        let keeper = self.keeper.map(|keeper| keeper as &dyn render::Keeper);
-        let done = work(&Control { stop: &stop, progress: &report, keeper });
+        let sink = self.sink.map(|sink| sink as &dyn render::CheckpointSink);
+        let done = work(&Control { stop: &stop, progress: &report, sink });
         bar.finish_and_clear();
         done
     }
 
-    /// As many samples for every pixel.
-    fn straight(&self, begun: Begun, stats: &mut Stats) -> Result<Made> {
+    /// The same number of samples for every pixel.
+    fn straight(&self, start: Start, stats: &mut Stats) -> Result<Rendered> {
         let args = self.args;
         let budget = match args.time {
             Some(time) => Budget::Time(time),
             None => Budget::Spp(args.spp.unwrap_or(self.scene.sensor().spp)),
         };
-        let settings = self.settings(begun.render.film.needs, budget);
-        let outcome = self.controlled(|control| Ok(render::resume(self.scene, settings, control, begun.render)))?;
+        let settings = self.settings(start.render.film.needs, budget);
+        let outcome = self.controlled(|control| Ok(render::resume(self.scene, settings, control, start.render)))?;
         self.warn(&outcome);
         stats.rendered(&outcome);
-        let start = Instant::now();
-        let mut frame = outcome.film.develop();
-        if self.method.needs().edges && self.plan.is_dark() {
-            frame.fill_dark_edges();
-        }
-        frame.attributes = self.attributes(stats);
-        stats.seconds.develop = start.elapsed().as_secs_f64();
+        let developing = Instant::now();
+        let frame = outcome.film.develop().with_provenance(self.provenance(stats));
+        stats.seconds.develop = developing.elapsed().as_secs_f64();
         let layers = self.save_layers(&frame, stats);
         let solution = args.method.solve(self.method, &frame, args.quiet, stats)?;
-        Ok(Made { frame, solution, layers })
+        Ok(Rendered { frame, solution, layers })
     }
 
-    /// In passes, samples where they are needed.
-    fn adaptive(&self, begun: Begun, stats: &mut Stats) -> Result<Made> {
+    /// In passes that allocate samples to the pixels that need them.
+    fn adaptive(&self, start: Start, stats: &mut Stats) -> Result<Rendered> {
         let args = self.args;
         let limits = Limits {
             // Without any limit the scene says how much.
@@ -98,28 +92,27 @@ impl Job<'_> {
             time: args.time,
             error: args.target_error,
         };
-        let settings = adaptive::Settings {
-            render: self.settings(begun.render.film.needs, Budget::Spp(1)),
+        let settings = AdaptiveSettings {
+            render: self.settings(start.render.film.needs, Budget::Spp(1)),
             method: self.method,
             allocator: adaptive::allocator(args.adaptive.as_deref().unwrap_or("uniform"))?,
             limits,
             reconstruction: None,
-            lit: !self.plan.is_dark(),
         };
         let context = args.method.context(&|_, _| ());
         let outcome =
-            self.controlled(|control| Ok(adaptive::resume(self.scene, &settings, control, &context, begun)?))?;
-        let adaptive::Outcome { render, mut frame, solution, passes, develop, reconstruct } = outcome;
+            self.controlled(|control| Ok(adaptive::resume(self.scene, &settings, control, &context, start)?))?;
+        let AdaptiveOutcome { render, frame, solution, passes, develop, reconstruct } = outcome;
         self.warn(&render);
         stats.rendered(&render);
         (stats.seconds.develop, stats.seconds.reconstruct, stats.passes) = (develop, reconstruct, passes);
-        frame.attributes = self.attributes(stats);
+        let frame = frame.with_provenance(self.provenance(stats));
         let layers = self.save_layers(&frame, stats);
         args.method.write_notes(&solution, &frame)?;
         if let (false, Some(error)) = (args.quiet, stats.passes.last().and_then(|pass| pass.error)) {
             eprintln!("estimated relMSE {error:.2e} after {} passes", stats.passes.len());
         }
-        Ok(Made { frame, solution, layers })
+        Ok(Rendered { frame, solution, layers })
     }
 
     /// Saves the layers, if they are asked for.
@@ -132,7 +125,7 @@ impl Job<'_> {
         Ok(())
     }
 
-    fn warn(&self, outcome: &Outcome) {
+    fn warn(&self, outcome: &RenderOutcome) {
         let args = self.args;
         if let Some((path, count)) = failed_lookups() {
             let path = path.display();
@@ -162,18 +155,17 @@ impl Job<'_> {
         }
     }
 
-    /// Header attributes of everything that is written.
-    fn attributes(&self, stats: &Stats) -> Vec<(String, String)> {
-        let pairs = [
-            ("fluxion:version", env!("CARGO_PKG_VERSION").to_owned()),
-            ("fluxion:scene", self.args.scene.file_name().unwrap_or_default().to_string_lossy().into_owned()),
-            ("fluxion:fingerprint", format!("{:016x}", self.scene.fingerprint())),
-            ("fluxion:seed", self.args.seed.to_string()),
-            ("fluxion:spp", stats.spp.to_string()),
-            ("fluxion:seconds", format!("{:.3}", stats.seconds.render)),
-            ("fluxion:method", self.args.method.method.clone()),
-            ("fluxion:plan", stats.plan.clone()),
-        ];
-        pairs.map(|(name, value)| (name.to_owned(), value)).to_vec()
+    /// Provenance of everything that is written.
+    fn provenance(&self, stats: &Stats) -> Provenance {
+        Provenance {
+            scene: self.args.scene.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+            fingerprint: format!("{:016x}", self.scene.fingerprint()),
+            seed: self.args.seed.to_string(),
+            spp: stats.spp.to_string(),
+            seconds: format!("{:.3}", stats.seconds.render),
+            method: self.args.method.method.clone(),
+            plan: stats.plan.clone(),
+            ..Provenance::new()
+        }
     }
 }

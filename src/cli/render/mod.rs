@@ -9,13 +9,12 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Result, bail};
 use clap::builder::{PossibleValue, PossibleValuesParser};
-use fluxion::adaptive::{ALLOCATORS, Allocator, Begun};
+use fluxion::adaptive::{ALLOCATORS, Allocator, Start};
 use fluxion::checkpoint::{Origin, Run, content};
 use fluxion::error::Error;
 use fluxion::film::Needs;
 use fluxion::plan::Plan;
-use fluxion::render::gradient::shift::{SHIFTS, Shift};
-use fluxion::render::{self, Outcome, SampleId};
+use fluxion::render::{self, RenderOutcome, SHIFTS, SampleId, Shift};
 use fluxion::scene::{Scene, load};
 
 use self::job::Job;
@@ -37,7 +36,7 @@ pub struct Args {
     /// Time to render for, as in 60, 60s or 5m
     #[arg(long, value_parser = super::parse_time, value_name = "TIME")]
     time: Option<Duration>,
-    /// Deal samples to the pixels that need them, by an allocator
+    /// Give more samples to the pixels that need them, by an allocator
     #[arg(long, value_name = "ALLOCATOR", num_args = 0..=1, default_missing_value = ALLOCATORS[0].id(), value_parser = allocator_names())]
     adaptive: Option<String>,
     /// Stop when the estimated relMSE is below this; --spp or --time is a limit then
@@ -46,12 +45,12 @@ pub struct Args {
     /// Seed of the random numbers; the same seed gives the same bits on any number of threads
     #[arg(long, default_value_t = 0)]
     seed: u64,
-    /// Number of the first sample of every pixel: films that go on where others end have samples that are spread better
-    /// than those of other seeds
+    /// Number of the first sample of every pixel: films of one seed with consecutive samples are better stratified
+    /// together than films of different seeds
     #[arg(long, default_value_t = 0, hide_short_help = true, value_name = "N")]
     first: u32,
     #[command(flatten)]
-    keep: checkpoint::Args,
+    checkpoint: checkpoint::Args,
     /// Threads to work with (0: one per core)
     #[arg(long, default_value_t = 0)]
     threads: usize,
@@ -60,7 +59,7 @@ pub struct Args {
     size: Option<(usize, usize)>,
     #[command(flatten)]
     method: method::Args,
-    /// EXR file for everything that was recorded, for `fluxion reconstruct`
+    /// EXR file of all recorded layers, for `fluxion reconstruct`
     #[arg(long, value_name = "FILE")]
     layers: Option<PathBuf>,
     /// Record the statistics of eight independent groups of samples in the layers
@@ -72,13 +71,13 @@ pub struct Args {
     /// Record world positions in the layers
     #[arg(long, requires = "layers")]
     position: bool,
-    /// Record what an ambient light would add in the layers, by which `feature:ambient` sees what no path has lit
+    /// Record the radiance that an ambient light would add in the layers, by which `feature:ambient` sees unlit surfaces
     #[arg(long, requires = "layers")]
     ambient: bool,
-    /// What to compute: what the scene, the method and the layers need, or everything, to see what that saves
+    /// Compute what scene, method and layers need, or everything, to see the savings
     #[arg(long, default_value = "needed", value_enum, value_name = "WHAT")]
     plan: Planned,
-    /// JSON file for times, samples, memory and what was left out
+    /// JSON file for times, samples, memory and the plan
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
     /// Trace one sample again and print it: column, row and number of the sample
@@ -87,13 +86,13 @@ pub struct Args {
     /// Value of a scene parameter, over its <default>
     #[arg(short = 'D', value_parser = super::parse_definition, value_name = "NAME=VALUE")]
     define: Vec<(String, String)>,
-    /// How paths are moved to neighbouring pixels
-    #[arg(long, default_value = SHIFTS[0].0, value_parser = shift_names(), hide_short_help = true)]
+    /// How paths are shifted to neighbouring pixels
+    #[arg(long, default_value = SHIFTS[0].id, value_parser = shift_names(), hide_short_help = true)]
     shift: String,
-    /// Roughness above which `reconnect` goes through a material instead of copying half vectors
+    /// Roughness above which `reconnect` connects paths at a material instead of copying half vectors
     #[arg(long, value_name = "ALPHA", hide_short_help = true)]
     shift_threshold: Option<f32>,
-    /// Megabytes of textures to hold in memory; further images are read tile by tile as they are needed
+    /// Megabytes of textures to hold in memory; further images are read tile by tile on demand
     #[arg(long, default_value_t = 4096, value_name = "MB", value_parser = clap::value_parser!(u64).range(..1 << 40), hide_short_help = true)]
     texture_memory: u64,
     /// Show no progress
@@ -101,12 +100,12 @@ pub struct Args {
     quiet: bool,
 }
 
-/// What is computed.
+/// Extent of the plan.
 #[derive(Clone, Copy, clap::ValueEnum)]
 enum Planned {
-    /// What is needed.
+    /// Only what is needed.
     Needed,
-    /// Everything that can be.
+    /// Everything that can be recorded.
     All,
 }
 
@@ -125,8 +124,8 @@ fn parse_sample(text: &str) -> Result<(usize, usize, u32), String> {
 pub fn run(args: &Args) -> Result<ExitCode> {
     super::use_threads(args.threads)?;
     let method = args.method.make()?;
-    args.keep.check()?;
-    let _claims = Claims::new(&args.output, &[&args.layers, &args.json, &args.keep.checkpoint], &[&args.scene])?;
+    args.checkpoint.check()?;
+    let _claims = Claims::new(&args.output, &[&args.layers, &args.json, &args.checkpoint.checkpoint], &[&args.scene])?;
     let mut stats = Stats { method: args.method.method.clone(), ..Stats::default() };
     let start = Instant::now();
     let texture_memory = args.texture_memory << 20;
@@ -151,7 +150,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let plan = match args.plan {
         Planned::Needed => Plan::new(&scene, method.needs(), saved),
         Planned::All => {
-            scene.generalize();
+            scene.disable_fast_paths();
             Plan::all(&scene)
         }
     };
@@ -159,32 +158,33 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     if let Some(sample) = args.replay {
         return replay(args, &scene, sample);
     }
-    let origin = args.keep.checkpoint.as_ref().map(|_| origin(args, &scene, &plan)).transpose()?;
+    let origin = args.checkpoint.checkpoint.as_ref().map(|_| origin(args, &scene, &plan)).transpose()?;
     let journal = Mutex::default();
-    let begun = match origin.as_ref().map(|origin| args.keep.load(origin)).transpose()?.flatten() {
-        Some(checkpoint) => checkpoint.begun(&journal),
-        None => Begun { render: Outcome::new(&scene, plan.needs), journal: &journal },
+    let start = match origin.as_ref().map(|origin| args.checkpoint.load(origin)).transpose()?.flatten() {
+        Some(checkpoint) => checkpoint.resume(&journal),
+        None => Start { render: RenderOutcome::new(&scene, plan.needs), journal: &journal },
     };
-    let keeper = origin.and_then(|origin| args.keep.keeper(origin, &begun));
-    let made = Job { args, scene: &scene, method: method.as_ref(), plan: &plan, keeper: keeper.as_ref() }
-        .run(begun, &mut stats);
-    match &keeper {
-        Some(keeper) => keeper.conclude(made)?,
-        None => made?,
+    let sink = origin.and_then(|origin| args.checkpoint.sink(origin, &start));
+    let done = Job { args, scene: &scene, method: method.as_ref(), sink: sink.as_ref() }.run(start, &mut stats);
+    match &sink {
+        Some(sink) => sink.conclude(done)?,
+        None => done?,
     }
     report(args, &stats);
     Ok(ExitCode::SUCCESS)
 }
 
-/// What the samples are going to be taken of.
+/// Origin of the film that is going to be rendered.
 fn origin(args: &Args, scene: &Scene, plan: &Plan) -> Result<Origin> {
     Ok(Origin {
         version: env!("CARGO_PKG_VERSION").into(),
         scene: args.scene.file_name().unwrap_or_default().to_string_lossy().into_owned(),
         content: content(scene)?,
+        fingerprint: format!("{:016x}", scene.fingerprint()),
+        method: args.method.method.clone(),
+        plan: plan.summary(),
         size: (scene.sensor().width, scene.sensor().height),
         needs: plan.needs,
-        dark: plan.is_dark(),
         shift: shift(args),
         runs: vec![Run { seed: args.seed, first: args.first, samples: 0 }],
     })
@@ -196,15 +196,12 @@ fn allocator_names() -> PossibleValuesParser {
 }
 
 fn shift_names() -> PossibleValuesParser {
-    SHIFTS.iter().map(|(name, _, summary)| PossibleValue::new(*name).help(*summary)).collect::<Vec<_>>().into()
+    SHIFTS.iter().map(|kind| PossibleValue::new(kind.id).help(kind.summary)).collect::<Vec<_>>().into()
 }
 
 fn shift(args: &Args) -> Shift {
-    let row = SHIFTS.iter().find(|(name, ..)| *name == args.shift);
-    match (row.map(|(_, shift, _)| *shift).unwrap_or_default(), args.shift_threshold) {
-        (Shift::Reconnect { .. }, Some(threshold)) => Shift::Reconnect { threshold },
-        (shift, _) => shift,
-    }
+    let shift = Shift::named(&args.shift).unwrap_or_default();
+    args.shift_threshold.map_or(shift, |threshold| shift.with_threshold(threshold))
 }
 
 fn report(args: &Args, stats: &stats::Stats) {

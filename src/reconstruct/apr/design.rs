@@ -31,7 +31,7 @@ pub fn columns(features: usize, order: usize) -> usize {
 
 /// Position of a monomial among the columns.
 #[inline(always)]
-pub fn place(features: usize, monomial: usize) -> usize {
+pub fn monomial_index(features: usize, monomial: usize) -> usize {
     if monomial == 0 { 0 } else { features + monomial }
 }
 

@@ -1,6 +1,6 @@
 //! The least squares fits of one window, of all orders at once, from its sums.
 
-use super::design::{COLUMNS, MONOMIALS, ORDER, POWERS, columns, place};
+use super::design::{COLUMNS, MONOMIALS, ORDER, POWERS, columns, monomial_index};
 
 /// A window's fits: columns made orthogonal to those before them, and the colours' coefficients for each. The fit of an
 /// order is the sum over its columns.
@@ -63,7 +63,11 @@ fn translate(matrix: &mut Matrix, right: &mut [[f64; 3]; COLUMNS], features: usi
         let (a, b) = POWERS[m];
         for (n, &(i, j)) in POWERS[..m].iter().enumerate().filter(|(_, (i, j))| *i <= a && *j <= b) {
             let factor = binomial[a as usize][i as usize] * binomial[b as usize][j as usize];
-            terms.push((place(features, m), place(features, n), factor * dx[(a - i) as usize] * dy[(b - j) as usize]));
+            terms.push((
+                monomial_index(features, m),
+                monomial_index(features, n),
+                factor * dx[(a - i) as usize] * dy[(b - j) as usize],
+            ));
         }
     }
     for &(to, from, factor) in &terms {

@@ -15,8 +15,8 @@ use self::design::ORDER;
 use self::predict::{Candidates, LEVERAGE};
 use self::windows::Problem;
 use super::generated::{self, Options};
-use super::inputs::{FLOOR, Inputs, check_memory, raise};
-use super::{Context, Method, Parameter, Parameters, Reconstruction, Solution};
+use super::inputs::{FLOOR, Inputs, check_memory, floor_variance};
+use super::{Context, EdgeTrust, Method, Parameter, Parameters, Reconstruction, Solution, Traits};
 use crate::error::Result;
 use crate::film::{Frame, Layer, Needs};
 use crate::image::nl_means::{self, Guide, Guides, Settings};
@@ -26,6 +26,8 @@ use crate::image::planes::Planes;
 pub const METHOD: Method = Method {
     id: "apr",
     summary: "polynomials of adaptive order and features, also one generated from gradients, fitted in windows; consistent",
+    // Rounding may decide whether a monomial is independent of the others in a window.
+    traits: Traits { edges: EdgeTrust::ByVariance, exposure_tolerance: 1e-2, ..Traits::FILTER },
     parameters: &[
         Parameter {
             name: "features",
@@ -244,7 +246,7 @@ impl Blend {
         let square = self.color.zip(&self.prediction, |a, b| (a - b) * (a - b)).sum();
         let known = self.own.zip(&self.leverage, |own, leverage| own * (1.0 - 2.0 * leverage));
         let error = square.zip(&known, |square, known| square - known);
-        let color = Guide { mean: self.color.clone(), variance: raise(&self.own, FLOOR), tolerance: None };
+        let color = Guide { mean: self.color.clone(), variance: floor_variance(&self.own, FLOOR), tolerance: None };
         let settings = Settings { window: 8, patch: 3, color: 1.0, feature: None };
         let smooth = nl_means::filter(&error.and(&self.own), &Guides { color, features: Vec::new() }, settings);
         [smooth.part(0, 1), smooth.part(1, 1)]

@@ -6,11 +6,12 @@ use rayon::prelude::*;
 
 use super::form::Form;
 use super::level::Level;
+use crate::film::Edges;
 use crate::image::planes::Planes;
 use crate::math::rng;
 use crate::reconstruct::inputs::quads;
 use crate::solve::graph::Quad;
-use crate::solve::poisson::{Data, Weights};
+use crate::solve::poisson::{Targets, Weights};
 
 /// Pull towards the denoised image in the authors' form. Their gradient descent starts there and stops after a
 /// thousand small steps; a penalty of this weight acts alike on every frequency (docs/frgr.md).
@@ -56,23 +57,26 @@ impl Weight {
 pub fn enhance(level: &Level, denoised: &Planes, error: &Planes, form: Form, spp: f32) -> Enhanced {
     let (width, height) = (denoised.width, denoised.height);
     let pixels = || (0..width * height).into_par_iter().map(|i| ((i % width) as isize, (i / width) as isize));
-    let edges = |axis: usize| -> Vec<Weight> { pixels().map(|at| weight(level, form, spp, axis, at)).collect() };
-    let edges = [edges(0), edges(1)];
-    let [across, down]: [Vec<f32>; 2] = [0, 1].map(|axis: usize| edges[axis].par_iter().map(Weight::sum).collect());
+    let edges = Edges::cross((width, height));
+    let of_edge = |edge: usize| {
+        let lower = edges.ends(edge)[0];
+        weight(level, form, spp, edges.kind(edge), ((lower % width) as isize, (lower / width) as isize))
+    };
+    let of_edges: Vec<Weight> = (0..edges.len()).into_par_iter().map(of_edge).collect();
     let screen: Vec<f32> = pixels().map(|at| screen(level, error, form, spp, at)).collect();
     let data = quads(denoised, 0);
+    let gradients = [quads(&level.gradients[0], 0), quads(&level.gradients[1], 0)];
     // A sampled difference and one of zero together pull like their mean.
-    let pull = |axis: usize| -> Vec<Quad> {
-        let share = edges[axis].par_iter().map(|weight| weight.sampled / weight.sum());
-        let sampled = quads(&level.gradients[axis], 0);
-        sampled.into_par_iter().zip(share).map(|(edge, share)| edge.map(|value| share * value)).collect()
+    let pull = |(edge, weight): (usize, &Weight)| {
+        let share = weight.sampled / weight.sum();
+        gradients[edges.kind(edge)][edges.ends(edge)[0]].map(|value| share * value)
     };
-    let weights = Weights { across, down, screen };
-    let [dx, dy] = [pull(0), pull(1)];
-    let mut right = weights.right(Data { width, data: &data, edges: [&dx, &dy] });
+    let differences: Vec<Quad> = of_edges.par_iter().enumerate().map(pull).collect();
+    let weights = Weights { edges: of_edges.par_iter().map(Weight::sum).collect(), screen };
+    let mut rhs = weights.rhs(Targets { edges: &edges, data: &data, differences: &differences });
     // The fourth channel is random signs, for the error.
-    right.iter_mut().enumerate().for_each(|(i, right)| right[3] = sign(i));
-    let solved = weights.solver(width).solve(&right, data, TOLERANCE).x;
+    rhs.iter_mut().enumerate().for_each(|(i, rhs)| rhs[3] = sign(i));
+    let solved = weights.solver(&edges).solve(&rhs, data, TOLERANCE).x;
     let image = Planes::from_fn(width, height, 3, |c, x, y| solved[y * width + x][c]);
     let error = (form == Form::Best).then(|| {
         // The inverse of the matrix is the covariance of the errors when all weights are inverse variances. The

@@ -2,7 +2,7 @@
 
 use crate::image::planes::Planes;
 use crate::reconstruct::features::Feature;
-use crate::reconstruct::inputs::{FLOOR, raise};
+use crate::reconstruct::inputs::{FLOOR, floor_variance};
 
 /// Means and variances of the means, radiance in units of its typical luminance.
 pub struct Level {
@@ -23,8 +23,8 @@ const GRADIENT_FLOOR: f32 = 0.25;
 
 impl Level {
     /// The same with variances raised to a share of those around them.
-    pub fn without_certainty(self) -> Self {
-        let noise = [raise(&self.noise[0], GRADIENT_FLOOR), raise(&self.noise[1], GRADIENT_FLOOR)];
-        Self { variance: raise(&self.variance, FLOOR), noise, ..self }
+    pub fn with_variance_floor(self) -> Self {
+        let noise = [floor_variance(&self.noise[0], GRADIENT_FLOOR), floor_variance(&self.noise[1], GRADIENT_FLOOR)];
+        Self { variance: floor_variance(&self.variance, FLOOR), noise, ..self }
     }
 }

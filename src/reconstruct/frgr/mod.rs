@@ -27,7 +27,7 @@ use self::level::Level;
 use self::resample::Resampling;
 use super::features::{Feature, Kind};
 use super::inputs::{Inputs, too_little};
-use super::{Context, Method, Note, Parameter, Parameters, Reconstruction, Solution};
+use super::{Context, EdgeTrust, Method, Note, Parameter, Parameters, Reconstruction, Solution, Traits};
 use crate::error::{Error, Result};
 use crate::film::{Frame, Needs};
 use crate::image::Image;
@@ -44,6 +44,7 @@ const fn parameter(name: &'static str, default: &'static str, summary: &'static 
 pub const METHOD: Method = Method {
     id: "frgr",
     summary: "colours filtered by weights that gradients and features guide, on several scales; consistent",
+    traits: Traits { edges: EdgeTrust::ByVariance, ..Traits::FILTER },
     parameters: &[
         parameter("levels", "2", "resolutions that are worked on, 1 to 8, each half of the one before"),
         parameter("radius", "4", "radius of the gradient-guided filter's window, 1 to 10 pixels"),
@@ -106,7 +107,7 @@ struct Prepared {
 
 impl Reconstruction for Frgr {
     fn needs(&self) -> Needs {
-        Needs { features: !self.features.is_empty(), edges: true, ..Needs::default() }
+        Needs { features: !self.features.is_empty(), ..Needs::EDGES }
     }
 
     fn estimates_error(&self) -> bool {
@@ -114,6 +115,7 @@ impl Reconstruction for Frgr {
     }
 
     fn reconstruct(&self, frame: &Frame, context: &Context) -> Result<Solution> {
+        frame.cross()?;
         (context.progress)("clean", 0.0);
         let inputs = Inputs::new(frame, 1 << (self.levels - 1))?;
         let rows = rows(&inputs, context.memory)?;
@@ -175,7 +177,7 @@ impl Frgr {
             }
         }
         let level = Level { color, variance, gradients: [dx, dy], noise: [dx_noise, dy_noise], features };
-        Ok(if self.form == Form::Best { level.without_certainty() } else { level })
+        Ok(if self.form == Form::Best { level.with_variance_floor() } else { level })
     }
 
     fn denoise(&self, level: &Level, rows: usize, context: &Context) -> Denoised {

@@ -7,8 +7,8 @@
 mod regression;
 
 use self::regression::regress;
-use super::inputs::{FLOOR, Inputs, check_memory, raise};
-use super::{Context, Method, Parameter, Parameters, Reconstruction, Solution};
+use super::inputs::{FLOOR, Inputs, check_memory, floor_variance};
+use super::{Context, Method, Parameter, Parameters, Reconstruction, Solution, Traits};
 use crate::error::Result;
 use crate::film::{Frame, Layer, Needs};
 use crate::image::nl_means::{self, Guide, Guides, Settings};
@@ -18,6 +18,7 @@ use crate::image::planes::Planes;
 pub const METHOD: Method = Method {
     id: "nfor",
     summary: "colours fitted by features in windows (first-order regression); path tracing only, consistent",
+    traits: Traits { robust: false, ..Traits::FILTER },
     parameters: &[Parameter {
         name: "k",
         default: "0.5",
@@ -53,7 +54,7 @@ impl Reconstruction for Nfor {
         (context.progress)("features", 0.0);
         let [color, variance] = inputs.color()?;
         let own = variance.sum();
-        let variance = raise(&own, FLOOR);
+        let variance = floor_variance(&own, FLOOR);
         let features = features(&inputs)?;
         let halves = [inputs.half(0)?, inputs.half(1)?];
         // Half the samples have twice the variance.

@@ -1,95 +1,106 @@
-//! Gradient-domain path tracing: see the README beside this file for the estimator.
+//! Shift mappings: how the path of a pixel becomes a path of its neighbour, and what the two differ by. The README beside
+//! this file derives the estimator.
 
-mod offsets;
-pub mod shift;
-mod states;
+pub mod reconnect;
+mod replay;
 
-use self::offsets::{NOTHING, OUTSIDE, Offsets};
-use self::shift::{Room, Shift, Walk};
-use self::states::{Level, Prefix};
-use super::wave::{Traced, Views};
-use crate::film::EDGES;
-use crate::math::Rgb;
-use crate::math::lanes::LANES;
-use crate::scene::Scene;
+use serde::{Deserialize, Serialize};
 
-/// Shifts the paths of waves to their neighbours; keeps its room between them.
-pub struct Gradient {
-    shift: Shift,
-    ambient: bool,
-    offsets: Offsets,
-    states: Level,
-    next: Level,
-    room: Room,
+use super::camera::CameraSamples;
+use super::record::PathRecord;
+use super::tracer::PathTracer;
+
+/// A map from paths of a pixel to paths of its neighbours, with its scratch memory.
+pub trait ShiftMapping: Send {
+    /// Whether the vertices of base paths have to be recorded.
+    fn needs_vertices(&self) -> bool;
+
+    /// Shifts the recorded base paths of a wave and sets their samples' differences: this end's share of every edge, zero
+    /// across the film's border.
+    fn shift(&mut self, tracer: &mut PathTracer, camera: &CameraSamples, record: &mut PathRecord);
 }
 
-impl Gradient {
-    /// Differences by a shift, also those that an ambient light would make if asked for.
-    pub fn new(shift: Shift, ambient: bool) -> Self {
-        let (states, next) = (Level::default(), Level::default());
-        Self { shift, ambient, offsets: Offsets::default(), states, next, room: Room::default() }
+/// A row of the table of shift mappings.
+pub struct ShiftKind {
+    /// Name in `--shift`.
+    pub id: &'static str,
+    /// Description for help texts.
+    pub summary: &'static str,
+    /// Builds it, from the roughness threshold and whether the ambient light's differences are recorded, too.
+    make: fn(f32, bool) -> Box<dyn ShiftMapping>,
+}
+
+/// Every shift mapping, the default first.
+pub const SHIFTS: &[ShiftKind] = &[reconnect::SHIFT, replay::SHIFT];
+
+/// Roughness above which a smooth lobe counts as diffuse, unless given.
+const THRESHOLD: f32 = 0.001;
+
+/// A shift mapping with its parameter.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "(String, f32)", into = "(String, f32)")]
+pub struct Shift {
+    /// Position in [`SHIFTS`].
+    kind: usize,
+    /// Roughness above which a smooth lobe counts as diffuse.
+    threshold: f32,
+}
+
+impl Shift {
+    /// The shift mapping of a name, if there is one.
+    pub fn named(id: &str) -> Option<Self> {
+        let kind = SHIFTS.iter().position(|kind| kind.id == id)?;
+        Some(Self { kind, threshold: THRESHOLD })
     }
 
-    /// Whether paths must be recorded to be shifted; they are replayed otherwise.
-    pub fn needs_vertices(&self) -> bool {
-        self.shift != Shift::Replay
+    /// The same with another roughness threshold.
+    pub fn with_threshold(self, threshold: f32) -> Self {
+        Self { threshold, ..self }
     }
 
-    /// Adds this end of each edge to the samples.
-    pub fn shift(&mut self, scene: &Scene, views: &Views, traced: &mut Traced) {
-        let Shift::Reconnect { threshold } = self.shift else { return };
-        let Traced { levels, packets: counts, samples, reach, .. } = traced;
-        let packets = views.pixels.len().div_ceil(LANES);
-        if self.ambient {
-            reach.fill(u32::MAX);
-        }
-        self.offsets.start(scene, views, &levels[0][..packets]);
-        self.start(packets, reach);
-        for (k, &count) in counts.iter().enumerate() {
-            let below = counts.get(k + 1).map_or(&[][..], |&packets| &levels[k + 1][..packets]);
-            self.next.reset(below.len());
-            let walk = Walk { scene, threshold, ambient: self.ambient, base: &levels[0][..packets], below };
-            for (packet, vertices) in levels[k][..count].iter().enumerate() {
-                // The other ends of the edges account for what copies of a dark path would carry.
-                let mut lit = vertices.met;
-                vertices.met.lanes().for_each(|lane| lit.set(lane, reach[vertices.id.0[lane] as usize] > k as u32));
-                if !lit.any() {
-                    continue;
-                }
-                let apart = self.states.apart(packet);
-                let onward = walk.onward(vertices, lit, apart, |id| reach[id as usize] > k as u32 + 1);
-                for edge in 0..EDGES.len() {
-                    let states = self.states.get(packet, edge);
-                    let inside = lit & states.0.inside();
-                    let (room, next) = (&mut self.room, (&mut self.next, edge));
-                    let difference = walk.step(room, (vertices, &onward), lit, states, next, &mut self.offsets);
-                    for lane in inside.lanes() {
-                        let sample = &mut samples[vertices.id.0[lane] as usize];
-                        sample.edges[edge] += difference.light.get(lane);
-                        if self.ambient {
-                            sample.ambient.edges[edge] += difference.ambient.get(lane);
-                        }
-                    }
-                }
-            }
-            std::mem::swap(&mut self.states, &mut self.next);
-        }
+    /// Name in `--shift`.
+    pub fn id(self) -> &'static str {
+        SHIFTS[self.kind].id
     }
 
-    /// Offsets of lit paths begin apart, where the camera sees anything.
-    fn start(&mut self, packets: usize, reach: &[u32]) {
-        self.states.reset(packets);
-        let start = Prefix { throughput: Rgb::ONE, ratio: 1.0 };
-        for (sample, _) in reach.iter().enumerate().filter(|(_, reach)| **reach > 0) {
-            for edge in 0..EDGES.len() {
-                let place = self.offsets.first(sample, edge);
-                let (states, lane) = self.states.at(sample as u32, edge);
-                match place {
-                    OUTSIDE => {}
-                    NOTHING => states.fail(lane),
-                    place => states.part(lane, start, place),
-                }
-            }
+    /// Builds the mapping. `ambient`: record differences of the ambient light, too.
+    pub(super) fn mapping(self, ambient: bool) -> Box<dyn ShiftMapping> {
+        (SHIFTS[self.kind].make)(self.threshold, ambient)
+    }
+}
+
+impl Default for Shift {
+    fn default() -> Self {
+        Self { kind: 0, threshold: THRESHOLD }
+    }
+}
+
+impl TryFrom<(String, f32)> for Shift {
+    type Error = String;
+
+    fn try_from((id, threshold): (String, f32)) -> Result<Self, String> {
+        let shift = Self::named(&id).ok_or_else(|| format!("shift `{id}` is not known"))?;
+        Ok(shift.with_threshold(threshold))
+    }
+}
+
+impl From<Shift> for (String, f32) {
+    fn from(shift: Shift) -> Self {
+        (shift.id().to_owned(), shift.threshold)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shifts_survive_serialisation() {
+        for kind in SHIFTS {
+            let shift = Shift::named(kind.id).unwrap().with_threshold(0.25);
+            let text = serde_json::to_string(&shift).unwrap();
+            assert_eq!(serde_json::from_str::<Shift>(&text).unwrap(), shift);
         }
+        assert!(serde_json::from_str::<Shift>(r#"["nosuch", 0.1]"#).is_err());
     }
 }

@@ -15,12 +15,12 @@ pub const PLUGIN: Plugin<Arc<dyn Bsdf>> = Plugin { name: "blendbsdf", parameters
 
 fn make(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Bsdf>> {
     if object.get("weight").is_none() {
-        return Err(object.place.invalid("`blendbsdf` needs a `weight`"));
+        return Err(object.loc.invalid("`blendbsdf` needs a `weight`"));
     }
     let weight = loader.texture(object, "weight", Rgb::splat(0.5))?;
     match <[_; 2]>::try_from(loader.nested_bsdfs(object)?) {
         Ok(nested) => Ok(Arc::new(Blend { weight, nested })),
-        Err(other) => Err(object.place.invalid(format!("`blendbsdf` needs two nested bsdfs, not {}", other.len()))),
+        Err(other) => Err(object.loc.invalid(format!("`blendbsdf` needs two nested bsdfs, not {}", other.len()))),
     }
 }
 

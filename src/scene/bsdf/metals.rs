@@ -88,7 +88,7 @@ pub fn names() -> Vec<&'static str> {
     METALS.iter().map(|(name, ..)| *name).collect()
 }
 
-/// eta and k of the metal at a place in [`names`].
+/// eta and k of the metal at an index of [`names`].
 pub fn index_of_refraction(metal: usize) -> (Rgb, Rgb) {
     let (_, eta, k) = METALS[metal];
     (Rgb::from_array(eta), Rgb::from_array(k))

@@ -54,7 +54,7 @@ impl Roughness {
             (true, true) if object.get("alpha").is_none() => {
                 Ok(Self { kind, u: alpha("alpha_u")?, v: Some(alpha("alpha_v")?) })
             }
-            _ => Err(object.place_of("alpha_u").invalid("give either `alpha`, or both `alpha_u` and `alpha_v`")),
+            _ => Err(object.loc_of("alpha_u").invalid("give either `alpha`, or both `alpha_u` and `alpha_v`")),
         }
     }
 

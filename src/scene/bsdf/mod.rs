@@ -196,17 +196,17 @@ const IOR: &[(&str, f32)] = &[
 ];
 
 fn ior(object: &Object, name: &str, default: f32) -> Result<f32> {
-    if let Some(Property { value: Value::String(material), place, .. }) = object.get(name) {
+    if let Some(Property { value: Value::String(material), loc, .. }) = object.get(name) {
         let found = IOR.iter().find(|(known, _)| known.eq_ignore_ascii_case(material));
         let names = || IOR.iter().map(|(known, _)| *known).collect::<Vec<_>>().join(", ");
-        let unknown = || place.unsupported(format!("`{material}` is no known material; there are {}", names()));
+        let unknown = || loc.unsupported(format!("`{material}` is no known material; there are {}", names()));
         return found.map(|(_, ior)| *ior).ok_or_else(unknown);
     }
     let value = object.float(name, default)?;
     if value > 0.0 && value.is_finite() {
         Ok(value)
     } else {
-        Err(object.place_of(name).invalid(format!("`{name}` must be positive")))
+        Err(object.loc_of(name).invalid(format!("`{name}` must be positive")))
     }
 }
 

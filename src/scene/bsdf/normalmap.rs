@@ -20,7 +20,7 @@ pub const PLUGIN: Plugin<Arc<dyn Bsdf>> = Plugin {
 
 fn make(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Bsdf>> {
     if object.get("normalmap").is_none() {
-        return Err(object.place.invalid("`normalmap` needs a texture `normalmap`"));
+        return Err(object.loc.invalid("`normalmap` needs a texture `normalmap`"));
     }
     let normals = Normals(loader.texture(object, "normalmap", vec3(0.5, 0.5, 1.0))?);
     Ok(Arc::new(Bent::load(object, loader, normals)?))

@@ -22,7 +22,7 @@ pub const PLUGIN: Plugin<Arc<dyn Bsdf>> = Plugin {
 fn make(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Bsdf>> {
     let eta = relative_ior(object, BK7)?;
     if (eta - 1.0).abs() < 1e-4 {
-        return Err(object.place_of("int_ior").unsupported("a rough boundary between equal indices of refraction"));
+        return Err(object.loc_of("int_ior").unsupported("a rough boundary between equal indices of refraction"));
     }
     Ok(Arc::new(RoughDielectric {
         eta,

@@ -24,7 +24,7 @@ fn make(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Bsdf>> {
     object.ignore(&["sample_visible"]);
     let eta = relative_ior(object, POLYPROPYLENE)?;
     if eta <= 1.0 {
-        return Err(object.place.unsupported("roughplastic with an interior no denser than its exterior"));
+        return Err(object.loc.unsupported("roughplastic with an interior no denser than its exterior"));
     }
     let facets = Microfacet::new(Kind::load(object)?, object.float("alpha", 0.1)?);
     let transmittance = RoughTransmittance::new(facets, eta);

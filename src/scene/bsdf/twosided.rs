@@ -16,12 +16,12 @@ pub const PLUGIN: Plugin<Arc<dyn Bsdf>> =
 fn make(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Bsdf>> {
     let nested = loader.nested_bsdfs(object)?;
     if nested.iter().any(|bsdf| bsdf.transmits()) {
-        return Err(object.place.invalid("`twosided` around a bsdf that transmits light; nest it the other way round"));
+        return Err(object.loc.invalid("`twosided` around a bsdf that transmits light; nest it the other way round"));
     }
     match nested.as_slice() {
         [both] => Ok(Arc::new(TwoSided { front: Arc::clone(both), back: Arc::clone(both) })),
         [front, back] => Ok(Arc::new(TwoSided { front: Arc::clone(front), back: Arc::clone(back) })),
-        other => Err(object.place.invalid(format!("`twosided` needs one or two nested bsdfs, not {}", other.len()))),
+        other => Err(object.loc.invalid(format!("`twosided` needs one or two nested bsdfs, not {}", other.len()))),
     }
 }
 

@@ -1,4 +1,4 @@
-//! A shape that glows on its outside.
+//! A shape that emissive on its outside.
 
 use std::f32::consts::PI;
 use std::sync::Arc;
@@ -49,7 +49,7 @@ impl Emitter for Area {
         Some(Extent { bounds: self.geometry.bounds(), axis, spread, reach: 0.5 * PI })
     }
 
-    fn even(&self) -> Option<(&Arc<Geometry>, Rgb)> {
+    fn uniform_mesh(&self) -> Option<(&Arc<Geometry>, Rgb)> {
         Some((&self.geometry, self.radiance.constant()?))
     }
 

@@ -10,7 +10,7 @@ const MANY: usize = 100;
 
 /// The chances of a scene's emitters.
 pub struct Choice {
-    /// Every emitter; of many only those without a place, then the tree of all others.
+    /// Every emitter; of many only those without a position (infinitely far), then the tree of all others.
     table: Alias,
     /// Numbers of the table's emitters, where it has not all.
     listed: Vec<u32>,

@@ -13,11 +13,11 @@ pub const PLUGIN: Plugin<Box<dyn Emitter>> =
 
 fn make(object: &Object, loader: &mut Loader) -> Result<Box<dyn Emitter>> {
     if object.get("direction").is_some() && object.get("to_world").is_some() {
-        return Err(object.place_of("direction").invalid("give either `direction` or `to_world`"));
+        return Err(object.loc_of("direction").invalid("give either `direction` or `to_world`"));
     }
     let along = object.transform("to_world")?.transform_vector3(Vec3::Z);
     let direction = object.vector("direction", along)?.try_normalize();
-    let direction = direction.ok_or_else(|| object.place_of("direction").invalid("`direction` has length zero"))?;
+    let direction = direction.ok_or_else(|| object.loc_of("direction").invalid("`direction` has length zero"))?;
     Ok(Box::new(Directional { direction, irradiance: loader.uniform_radiance(object, "irradiance")?, area: 1.0 }))
 }
 

@@ -26,7 +26,7 @@ fn make(object: &Object, loader: &mut Loader) -> Result<Box<dyn Emitter>> {
         loader.texels(path)?
     };
     if texels.width < 2 || texels.height < 3 {
-        return Err(object.place_of("filename").invalid("an environment needs at least 2x3 pixels"));
+        return Err(object.loc_of("filename").invalid("an environment needs at least 2x3 pixels"));
     }
     Ok(Box::new(EnvMap::new(texels, scale, to_world)))
 }
@@ -44,8 +44,8 @@ pub struct EnvMap {
     area: f32,
 }
 
-/// Sixteen points of an environment, which are the same from everywhere.
-pub struct Sky {
+/// Sixteen directions sampled from an environment image.
+pub struct EnvmapSample {
     /// Unit directions towards them.
     pub direction: Lanes3,
     /// Densities per solid angle.
@@ -57,24 +57,24 @@ pub struct Sky {
 impl EnvMap {
     /// [`Emitter::sample`] with density and radiance, for the active ones.
     #[inline(always)]
-    pub fn sample_packet(&self, [u, v]: [Lanes; 2], active: Mask) -> Sky {
-        let mut sky = Sky { direction: Lanes3::ZERO, pdf: Lanes::ZERO, radiance: Lanes3::ZERO };
-        let Some(grid) = &self.grid else { return sky };
+    pub fn sample_packet(&self, [u, v]: [Lanes; 2], active: Mask) -> EnvmapSample {
+        let mut sample = EnvmapSample { direction: Lanes3::ZERO, pdf: Lanes::ZERO, radiance: Lanes3::ZERO };
+        let Some(grid) = &self.grid else { return sample };
         let (mut x, mut y, mut cell_pdf) = (Lanes::ZERO, Lanes::ZERO, Lanes::ZERO);
         let points = grid.sample_packet(u.0, v.0, active);
         for lane in active.lanes() {
             let (uv, pdf) = points[lane];
             (x.0[lane], y.0[lane], cell_pdf.0[lane]) = (uv.x, uv.y, pdf);
         }
-        active.lanes().for_each(|lane| sky.radiance.set(lane, self.look_up(vec2(x.0[lane], y.0[lane]))));
+        active.lanes().for_each(|lane| sample.radiance.set(lane, self.look_up(vec2(x.0[lane], y.0[lane]))));
         let (cos_phi, sin_phi) = x.cos_sin_turns();
         let (cos, sin) = (y * Lanes::splat(0.5)).cos_sin_turns();
         let local = Lanes3 { x: sin_phi * sin, y: cos, z: -cos_phi * sin };
         let axis = |column: Vec4| Lanes3::splat(column.truncate());
         let [right, up, back] = [self.to_world.x_axis, self.to_world.y_axis, self.to_world.z_axis].map(axis);
-        sky.direction = (right * local.x + up * local.y + back * local.z).normalize_or(Lanes3::ZERO);
-        sky.pdf = cell_pdf / (Lanes::splat(2.0 * PI * PI) * sin.max(Lanes::splat(1e-6)));
-        sky
+        sample.direction = (right * local.x + up * local.y + back * local.z).normalize_or(Lanes3::ZERO);
+        sample.pdf = cell_pdf / (Lanes::splat(2.0 * PI * PI) * sin.max(Lanes::splat(1e-6)));
+        sample
     }
 
     fn new(texels: Arc<Texels>, scale: f32, to_world: Mat4) -> Self {
@@ -117,7 +117,7 @@ impl EnvMap {
     }
 }
 
-/// A point of the environment knows its place in the image: it is looked up more than once.
+/// A point of the environment keeps its texel, since it is looked up more than once.
 fn far(direction: Vec3, uv: Vec2) -> LightPoint {
     let at = texture::Point { uv, ..texture::Point::default() };
     LightPoint { at, ..LightPoint::at_infinity(direction, 0) }
@@ -132,7 +132,7 @@ impl Emitter for EnvMap {
         Some(far(direction.normalize(), uv))
     }
 
-    fn around(&self, direction: Vec3) -> LightPoint {
+    fn environment_point(&self, direction: Vec3) -> LightPoint {
         far(direction, self.uv(direction))
     }
 
@@ -162,7 +162,7 @@ impl Emitter for EnvMap {
         true
     }
 
-    fn map(&self) -> Option<&EnvMap> {
+    fn envmap(&self) -> Option<&EnvMap> {
         Some(self)
     }
 

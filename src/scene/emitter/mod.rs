@@ -107,7 +107,7 @@ impl LightPoint {
 
 /// A source of light.
 pub trait Emitter: Send + Sync {
-    /// A point to light `from` with; its emitter number is left to the scene.
+    /// Samples a point that may light `from`. The scene sets its emitter index.
     fn sample(&self, from: Vec3, u: Vec2) -> Option<LightPoint>;
 
     /// Density of [`Emitter::sample`] per solid angle at `from`; for an only point, over its area taken as one.
@@ -119,32 +119,31 @@ pub trait Emitter: Send + Sync {
     /// Emitted power, for choosing among emitters; a rough figure will do, but 0 only for no light at all.
     fn power(&self) -> f32;
 
-    /// Where it is and shines; `None` when it is everywhere or nowhere.
+    /// Bounds of positions and directions of emission; `None` for emitters without a position, and for black ones.
     fn extent(&self) -> Option<Extent> {
         None
     }
 
-    /// Told once what the emitter lights, for those that surround it.
+    /// Called once with the scene's bounds, for emitters at infinity.
     fn enclose(&mut self, _scene: Bounds) {}
 
-    /// The point that a ray ends on which meets nothing, for those that surround the scene; its emitter number is left to
-    /// the scene.
-    fn around(&self, direction: Vec3) -> LightPoint {
+    /// The emitter point of an environment for rays along `direction` that hit nothing. The scene sets its emitter index.
+    fn environment_point(&self, direction: Vec3) -> LightPoint {
         LightPoint::at_infinity(direction, 0)
     }
 
-    /// Whether rays that meet nothing end on it.
+    /// Whether rays that hit nothing end on it.
     fn is_environment(&self) -> bool {
         false
     }
 
-    /// The image, of one that is an image around the scene.
-    fn map(&self) -> Option<&EnvMap> {
+    /// The environment image, if the emitter is one.
+    fn envmap(&self) -> Option<&EnvMap> {
         None
     }
 
-    /// The shape and its radiance, of one that sends the same from everywhere on its outside.
-    fn even(&self) -> Option<(&Arc<Geometry>, Rgb)> {
+    /// Shape and radiance, if the emitter sends the same radiance from everywhere on its outside.
+    fn uniform_mesh(&self) -> Option<(&Arc<Geometry>, Rgb)> {
         None
     }
 

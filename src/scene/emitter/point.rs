@@ -15,7 +15,7 @@ pub const PLUGIN: Plugin<Box<dyn Emitter>> =
 
 fn make(object: &Object, loader: &mut Loader) -> Result<Box<dyn Emitter>> {
     if object.get("position").is_some() && object.get("to_world").is_some() {
-        return Err(object.place_of("position").invalid("give either `position` or `to_world`"));
+        return Err(object.loc_of("position").invalid("give either `position` or `to_world`"));
     }
     let origin = object.transform("to_world")?.transform_point3(Vec3::ZERO);
     let position = object.vector("position", origin)?;

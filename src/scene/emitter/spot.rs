@@ -23,7 +23,7 @@ fn make(object: &Object, loader: &mut Loader) -> Result<Box<dyn Emitter>> {
     let beam = object.float("beam_width", 0.75 * cutoff)?;
     if !(cutoff > 0.0 && cutoff <= 90.0 && (0.0..=cutoff).contains(&beam)) {
         let what = format!("a cone of {cutoff} degrees around a beam of {beam}; needed: 0 <= beam <= cone <= 90");
-        return Err(object.place_of("cutoff_angle").invalid(what));
+        return Err(object.loc_of("cutoff_angle").invalid(what));
     }
     let to_world = object.transform("to_world")?;
     Ok(Box::new(Spot {

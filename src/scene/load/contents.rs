@@ -70,7 +70,7 @@ impl Contents {
                 children.iter().try_for_each(|child| self.shape(child, loader))
             }),
             _ if self.shapes.len() >= MAX_SHAPES => {
-                Err(object.place.invalid(format!("more than {MAX_SHAPES} shapes: use instances, or larger meshes")))
+                Err(object.loc.invalid(format!("more than {MAX_SHAPES} shapes: use instances, or larger meshes")))
             }
             _ => {
                 let number = (self.shapes.len() as u32, self.emitters.len() as u32);
@@ -87,15 +87,15 @@ impl Contents {
         let to_world = object.transform("to_world")?;
         let groups = children(object, loader)?;
         let [group] = groups.as_slice() else {
-            return Err(object.place.invalid("an instance needs exactly one shapegroup"));
+            return Err(object.loc.invalid("an instance needs exactly one shapegroup"));
         };
         if group.plugin != "shapegroup" {
-            return Err(group.place.invalid(format!("an instance of `{}`; it takes a shapegroup", group.plugin)));
+            return Err(group.loc.invalid(format!("an instance of `{}`; it takes a shapegroup", group.plugin)));
         }
         object.all_used("to_world, one shapegroup")?;
         let (bounds, group) = self.group(group, loader)?;
         if !bounds.transformed(to_world).is_finite() {
-            return Err(object.place.invalid("coordinates are not finite"));
+            return Err(object.loc.invalid("coordinates are not finite"));
         }
         group.placements.push(to_world);
         Ok(())
@@ -110,11 +110,11 @@ impl Contents {
         let mut shapes = Vec::new();
         for child in children(object, loader)? {
             if CONTAINERS.iter().any(|(name, _)| *name == child.plugin) {
-                return Err(child.place.unsupported(format!("`{}` in a shapegroup", child.plugin)));
+                return Err(child.loc.unsupported(format!("`{}` in a shapegroup", child.plugin)));
             }
             if let Some((shape, emitter)) = single(&child, loader, (0, 0))? {
                 if emitter.is_some() {
-                    return Err(child.place.unsupported("an emitter in a shapegroup"));
+                    return Err(child.loc.unsupported("an emitter in a shapegroup"));
                 }
                 shapes.push(shape);
             }
@@ -134,7 +134,7 @@ fn children(object: &Object, loader: &Loader) -> Result<Vec<Rc<Object>>> {
     for property in object.nested() {
         let nested = loader.resolve(property)?;
         if nested.class != "shape" {
-            return Err(nested.place.unsupported(format!("a {} in a `{}`", nested.class, object.plugin)));
+            return Err(nested.loc.unsupported(format!("a {} in a `{}`", nested.class, object.plugin)));
         }
         property.take();
         found.push(nested);
@@ -154,10 +154,10 @@ fn single(object: &Object, loader: &mut Loader, (shape_number, emitter_number): 
         let nested = loader.resolve(property)?;
         property.take();
         match nested.class.as_str() {
-            "bsdf" if bsdf.is_some() => return Err(nested.place.invalid("a second bsdf; a shape has one")),
+            "bsdf" if bsdf.is_some() => return Err(nested.loc.invalid("a second bsdf; a shape has one")),
             "bsdf" => bsdf = Some(loader.bsdf(&nested)?),
             "emitter" if radiance.is_some() => {
-                return Err(nested.place.invalid("a second emitter; a shape has one"));
+                return Err(nested.loc.invalid("a second emitter; a shape has one"));
             }
             "emitter" if nested.plugin == "area" => {
                 radiance = Some(loader.radiance(&nested, "radiance")?);
@@ -166,7 +166,7 @@ fn single(object: &Object, loader: &mut Loader, (shape_number, emitter_number): 
             }
             other => {
                 let what = format!("{other} `{}` in a shape; it takes a bsdf and an area emitter", nested.plugin);
-                return Err(nested.place.unsupported(what));
+                return Err(nested.loc.unsupported(what));
             }
         }
     }

@@ -20,7 +20,7 @@ pub fn load(object: &Object, loader: &Loader) -> Result<Integrator> {
     let Some((_, parameters)) = PLUGINS.iter().find(|(name, _)| *name == object.plugin) else {
         let names: Vec<_> = PLUGINS.iter().map(|(name, _)| *name).collect();
         let what = format!("integrator `{}`; there are {}", object.plugin, names.join(", "));
-        return Err(object.place.unsupported(what));
+        return Err(object.loc.unsupported(what));
     };
     let integrator = match object.plugin.as_str() {
         "moment" | "aov" => {
@@ -43,7 +43,7 @@ fn nested(object: &Object, loader: &Loader) -> Result<Integrator> {
         property.take();
         let nested = loader.resolve(property)?;
         if found.is_some() || nested.class != "integrator" || ["moment", "aov"].contains(&nested.plugin.as_str()) {
-            return Err(nested.place.unsupported(format!("`{}` takes one path integrator", object.plugin)));
+            return Err(nested.loc.unsupported(format!("`{}` takes one path integrator", object.plugin)));
         }
         found = Some(load(&nested, loader)?);
     }
@@ -60,7 +60,7 @@ fn path(object: &Object) -> Result<Integrator> {
     let max_depth = if depth < 0 { u32::MAX } else { u32::try_from(depth).unwrap_or(u32::MAX) };
     let rr_depth = object.integer("rr_depth", i64::from(defaults.rr_depth))?;
     let rr_depth = u32::try_from(rr_depth).ok().filter(|&depth| depth > 0);
-    let rr_depth = rr_depth.ok_or_else(|| object.place_of("rr_depth").invalid("`rr_depth` must be at least 1"))?;
+    let rr_depth = rr_depth.ok_or_else(|| object.loc_of("rr_depth").invalid("`rr_depth` must be at least 1"))?;
     // Older files may ask for a check of normals that version 3 no longer has.
     object.ignore(&["strict_normals"]);
     Ok(Integrator { max_depth, rr_depth, hide_emitters: hide_emitters(object)? })

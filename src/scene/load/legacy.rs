@@ -33,13 +33,13 @@ pub fn rename(plugin: &str, properties: &mut Vec<Property>) {
         }
     };
     const PARTS: [&str; 4] = ["uscale", "vscale", "uoffset", "voffset"];
-    let Some(place) = properties.iter().find(|property| PARTS.contains(&property.name.as_str())) else { return };
-    let place = place.place.clone();
+    let Some(loc) = properties.iter().find(|property| PARTS.contains(&property.name.as_str())) else { return };
+    let loc = loc.loc.clone();
     let offset = vec3(number("uoffset", 0.0), number("voffset", 0.0), 0.0);
     let scale = vec3(number("uscale", 1.0), number("vscale", 1.0), 1.0);
     let to_uv = transform::chain(&[transform::translate(offset), transform::scale(scale)]);
     properties.retain(|property| !PARTS.contains(&property.name.as_str()));
-    properties.push(Property::new("to_uv".into(), Value::Transform(to_uv), place));
+    properties.push(Property::new("to_uv".into(), Value::Transform(to_uv), loc));
 }
 
 #[cfg(test)]

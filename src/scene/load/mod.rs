@@ -23,8 +23,8 @@ use self::props::{Object, Property, Value};
 use super::bsdf::{self, Bsdf};
 use super::shape::Geometry;
 use super::texture::{self, Texture};
-use super::{Parts, Scene, sensor};
-use crate::error::{Error, Place, Result};
+use super::{Scene, SceneDescription, sensor};
+use crate::error::{Error, Result, SourceLoc};
 use crate::math::{Rgb, rng};
 
 /// Nesting deeper than this (a BSDF in a BSDF in ...) is taken for a loop of references.
@@ -127,21 +127,21 @@ fn build(path: &Path, tree: xml::Tree, options: &Options) -> Result<Scene> {
             "bsdf" | "texture" => {}
             other => {
                 let known = "shape, bsdf, texture, emitter, sensor, integrator";
-                return Err(object.place.unsupported(format!("<{other}> in a scene; there are {known}")));
+                return Err(object.loc.unsupported(format!("<{other}> in a scene; there are {known}")));
             }
         }
     }
-    let place = Place::file(path);
-    let sensor = sensor.ok_or_else(|| place.invalid("the scene has no sensor"))?;
+    let loc = SourceLoc::file(path);
+    let sensor = sensor.ok_or_else(|| loc.invalid("the scene has no sensor"))?;
     let Contents { shapes, groups, emitters } = contents;
     let integrator = integrator.unwrap_or_default();
     let groups = groups.into_values();
     let grouped = groups.iter().flat_map(|group| &group.shapes);
     texture::bind(loader.attributes, shapes.iter().chain(grouped).map(|shape| &shape.geometry))?;
     let files = loader.files.into_inner().into_iter().collect();
-    let parts = Parts { shapes, groups, emitters, sensor, integrator, fingerprint, files };
+    let parts = SceneDescription { shapes, groups, emitters, sensor, integrator, fingerprint, files };
     Scene::build(parts, options.threads).map_err(|error| match error {
-        Error::Usage(what) => place.invalid(what),
+        Error::BadData(what) => loc.invalid(what),
         other => other,
     })
 }
@@ -177,7 +177,7 @@ pub fn find<'a, T>(table: &'a [Plugin<T>], object: &Object) -> Result<&'a Plugin
                 format!("{class} `{plugin}` is not known; there are {}", names.join(", "))
             }
         };
-        object.place.unsupported(what)
+        object.loc.unsupported(what)
     })
 }
 
@@ -188,15 +188,15 @@ impl Loader {
             Value::Object(object) => Ok(Rc::clone(object)),
             Value::Reference(id) => {
                 let found = self.tree.ids.get(id).cloned();
-                found.ok_or_else(|| property.place.invalid(format!("nothing has the id `{id}`")))
+                found.ok_or_else(|| property.loc.invalid(format!("nothing has the id `{id}`")))
             }
-            _ => Err(property.place.invalid(format!("`{}` must be a nested object", property.name))),
+            _ => Err(property.loc.invalid(format!("`{}` must be a nested object", property.name))),
         }
     }
 
     fn guarded<T>(&mut self, object: &Object, make: impl FnOnce(&mut Self) -> Result<T>) -> Result<T> {
         if self.nesting >= MAX_NESTING {
-            return Err(object.place.invalid("nested too deeply: does it refer to itself?"));
+            return Err(object.loc.invalid("nested too deeply: does it refer to itself?"));
         }
         self.nesting += 1;
         let made = make(self);
@@ -211,7 +211,7 @@ impl Loader {
         let made = self.guarded(object, make)?;
         let cost = self.cost + 1;
         if cost > MAX_COST {
-            return Err(object.place.invalid(format!("built from more than {MAX_COST} other objects")));
+            return Err(object.loc.invalid(format!("built from more than {MAX_COST} other objects")));
         }
         self.cost = outer + cost;
         Ok((made, cost))
@@ -248,7 +248,7 @@ impl Loader {
         let mut found = self.nested_bsdfs(object)?;
         match (found.pop(), found.is_empty()) {
             (Some(bsdf), true) => Ok(bsdf),
-            _ => Err(object.place.invalid(format!("bsdf `{}` needs exactly one nested bsdf", object.plugin))),
+            _ => Err(object.loc.invalid(format!("bsdf `{}` needs exactly one nested bsdf", object.plugin))),
         }
     }
 
@@ -262,7 +262,7 @@ impl Loader {
                 found = Some(self.texture_object(&nested)?);
             }
         }
-        found.ok_or_else(|| object.place.invalid(format!("`{}` needs a nested texture", object.plugin)))
+        found.ok_or_else(|| object.loc.invalid(format!("`{}` needs a nested texture", object.plugin)))
     }
 
     /// The property `name` as a texture: a colour, a number, or a nested texture.
@@ -290,7 +290,7 @@ impl Loader {
     pub fn uniform_radiance(&mut self, object: &Object, name: &str) -> Result<Rgb> {
         let radiance = self.radiance(object, name)?;
         let what = format!("a texture as the `{name}` of `{}`; it is one colour", object.plugin);
-        radiance.constant().ok_or_else(|| object.place_of(name).unsupported(what))
+        radiance.constant().ok_or_else(|| object.loc_of(name).unsupported(what))
     }
 
     /// Builds a texture, or gives the one already built from this object.
@@ -300,7 +300,7 @@ impl Loader {
             return Ok(Arc::clone(texture));
         }
         if object.class != "texture" {
-            return Err(object.place.invalid(format!("a texture is needed here, not <{}>", object.class)));
+            return Err(object.loc.invalid(format!("a texture is needed here, not <{}>", object.class)));
         }
         let plugin = find(texture::PLUGINS, object)?;
         let (made, cost) = self.counted(object, |loader| (plugin.make)(object, loader))?;
@@ -313,13 +313,13 @@ impl Loader {
     pub fn file(&self, object: &Object) -> Result<PathBuf> {
         let name = object.string("filename", "")?;
         if name.is_empty() {
-            return Err(object.place.invalid(format!("{} `{}` needs a `filename`", object.class, object.plugin)));
+            return Err(object.loc.invalid(format!("{} `{}` needs a `filename`", object.class, object.plugin)));
         }
         let mut candidates = self.tree.folders.iter().map(|folder| folder.join(&name));
         let found = candidates.find(|path| path.is_file()).ok_or_else(|| {
             let folders: Vec<_> = self.tree.folders.iter().map(|folder| folder.display().to_string()).collect();
             let what = format!("no file `{name}` in {}", folders.join(" or "));
-            object.place_of("filename").invalid(what)
+            object.loc_of("filename").invalid(what)
         })?;
         self.files.borrow_mut().insert(found.clone());
         Ok(found)
@@ -343,7 +343,7 @@ impl Loader {
             return mesh::read(&object.plugin, &bytes(&path)?, 0, &path);
         }
         let index = usize::try_from(object.integer("shape_index", 0)?)
-            .map_err(|_| object.place_of("shape_index").invalid("`shape_index` cannot be negative"))?;
+            .map_err(|_| object.loc_of("shape_index").invalid("`shape_index` cannot be negative"))?;
         // One such file holds many meshes.
         if !self.meshes.contains_key(&path) {
             self.meshes.insert(path.clone(), bytes(&path)?);
@@ -353,10 +353,6 @@ impl Loader {
 
     /// A geometry whose transform or numbers leave the range of floats cannot be traced.
     pub fn finite(&self, object: &Object, geometry: Geometry) -> Result<Geometry> {
-        if geometry.bounds().is_finite() {
-            Ok(geometry)
-        } else {
-            Err(object.place.invalid("coordinates are not finite"))
-        }
+        if geometry.bounds().is_finite() { Ok(geometry) } else { Err(object.loc.invalid("coordinates are not finite")) }
     }
 }

@@ -4,7 +4,7 @@ use std::cell::Cell;
 use std::rc::Rc;
 
 use super::spectrum::Spectrum;
-use crate::error::{Error, Place, Result};
+use crate::error::{Error, Result, SourceLoc};
 use crate::math::{Mat4, Rgb, Vec3};
 
 /// A property's value.
@@ -40,14 +40,14 @@ pub struct Property {
     /// The value.
     pub value: Value,
     /// Where it stands.
-    pub place: Place,
+    pub loc: SourceLoc,
     used: Cell<bool>,
 }
 
 impl Property {
     /// A property nobody has asked for yet.
-    pub fn new(name: String, value: Value, place: Place) -> Self {
-        Self { name, value, place, used: Cell::new(false) }
+    pub fn new(name: String, value: Value, loc: SourceLoc) -> Self {
+        Self { name, value, loc, used: Cell::new(false) }
     }
 
     /// Marks a nested object as used.
@@ -56,7 +56,7 @@ impl Property {
     }
 
     fn mistyped(&self, expected: &str) -> Error {
-        self.place.invalid(format!("`{}` must be {expected}", self.name))
+        self.loc.invalid(format!("`{}` must be {expected}", self.name))
     }
 }
 
@@ -68,7 +68,7 @@ pub struct Object {
     /// Its `type`.
     pub plugin: String,
     /// Where it stands.
-    pub place: Place,
+    pub loc: SourceLoc,
     /// Everything in it, in order.
     pub properties: Vec<Property>,
 }
@@ -124,7 +124,7 @@ impl Object {
     pub fn choice(&self, name: &str, choices: &[&str], default: usize) -> Result<usize> {
         let value = self.string(name, choices[default])?;
         choices.iter().position(|choice| *choice == value).ok_or_else(|| {
-            self.place_of(name).unsupported(format!("`{name}` is `{value}`; it may be {}", choices.join(", ")))
+            self.loc_of(name).unsupported(format!("`{name}` is `{value}`; it may be {}", choices.join(", ")))
         })
     }
 
@@ -171,10 +171,10 @@ impl Object {
     pub fn transform(&self, name: &str) -> Result<Mat4> {
         match self.get(name) {
             None => Ok(Mat4::IDENTITY),
-            Some(Property { value: Value::Transform(matrix), place, .. }) => {
+            Some(Property { value: Value::Transform(matrix), loc, .. }) => {
                 let determinant = matrix.as_dmat4().determinant();
                 if determinant == 0.0 || !determinant.is_finite() {
-                    return Err(place.invalid(format!("the transform `{name}` cannot be inverted")));
+                    return Err(loc.invalid(format!("the transform `{name}` cannot be inverted")));
                 }
                 Ok(*matrix)
             }
@@ -183,8 +183,8 @@ impl Object {
     }
 
     /// Where `name` stands, or the object itself when it is absent.
-    pub fn place_of(&self, name: &str) -> Place {
-        self.properties.iter().find(|property| property.name == name).map_or(&self.place, |p| &p.place).clone()
+    pub fn loc_of(&self, name: &str) -> SourceLoc {
+        self.properties.iter().find(|property| property.name == name).map_or(&self.loc, |p| &p.loc).clone()
     }
 
     /// Nested objects and references. Whoever takes one marks it with [`Property::take`].
@@ -209,7 +209,7 @@ impl Object {
                     Value::Object(object) => format!("{class} `{plugin}` has no use for the {} here", object.class),
                     _ => format!("{class} `{plugin}` has no property `{}`", property.name),
                 };
-                Err(property.place.unsupported(format!("{what}; it takes: {supported}")))
+                Err(property.loc.unsupported(format!("{what}; it takes: {supported}")))
             }
         }
     }

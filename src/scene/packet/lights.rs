@@ -1,6 +1,6 @@
 //! Sixteen points of emitters.
 
-use super::finish::Facet;
+use super::info::LightTriangle;
 use super::{Rays, Surfaces, surfaces};
 use crate::math::lanes::{Bits, LANES, Lanes, Lanes3, Mask};
 use crate::math::{Rgb, Vec3, vec2};
@@ -22,11 +22,11 @@ pub struct Lights {
     pub delta: Mask,
     emitter: Bits,
     /// Which are on evenly glowing meshes.
-    even: Mask,
+    uniform_mesh: Mask,
     /// Which are the same from everywhere, with their densities and radiance.
-    sky: Mask,
-    sky_pdf: Lanes,
-    sky_radiance: Lanes3,
+    envmap: Mask,
+    envmap_pdf: Lanes,
+    envmap_radiance: Lanes3,
     /// The others.
     points: [LightPoint; LANES],
 }
@@ -40,10 +40,10 @@ impl Default for Lights {
             far: Mask::NONE,
             delta: Mask::NONE,
             emitter: Bits::ZERO,
-            even: Mask::NONE,
-            sky: Mask::NONE,
-            sky_pdf: Lanes::ZERO,
-            sky_radiance: Lanes3::ZERO,
+            uniform_mesh: Mask::NONE,
+            envmap: Mask::NONE,
+            envmap_pdf: Lanes::ZERO,
+            envmap_radiance: Lanes3::ZERO,
             points: [LightPoint::at_infinity(Vec3::Z, 0); LANES],
         }
     }
@@ -51,7 +51,7 @@ impl Default for Lights {
 
 impl Lights {
     /// Replaces one of them.
-    pub fn set(&mut self, lane: usize, point: LightPoint, lamps_are_even: bool) {
+    pub fn set(&mut self, lane: usize, point: LightPoint, uniform_mesh: bool) {
         let (at, n) = match point.position {
             Position::Surface { p, n } => (p, n),
             Position::Point { p } => (p, Vec3::ZERO),
@@ -63,22 +63,22 @@ impl Lights {
         self.far.set(lane, matches!(point.position, Position::Infinity { .. }));
         self.delta.set(lane, point.delta);
         self.emitter.0[lane] = point.emitter;
-        self.even.set(lane, lamps_are_even);
-        self.sky.set(lane, false);
+        self.uniform_mesh.set(lane, uniform_mesh);
+        self.envmap.set(lane, false);
         self.points[lane] = point;
     }
 
     /// One of them is in the sky.
-    fn set_sky(&mut self, lane: usize, (direction, emitter): (Vec3, u32), pdf: f32, radiance: Rgb) {
+    fn set_envmap(&mut self, lane: usize, (direction, emitter): (Vec3, u32), pdf: f32, radiance: Rgb) {
         self.set(lane, LightPoint::at_infinity(direction, emitter), false);
-        self.sky.set(lane, true);
-        self.sky_pdf.0[lane] = pdf;
-        self.sky_radiance.set(lane, radiance);
+        self.envmap.set(lane, true);
+        self.envmap_pdf.0[lane] = pdf;
+        self.envmap_radiance.set(lane, radiance);
     }
 
     /// One of them; of those in the sky only where they are.
     pub fn get(&self, lane: usize) -> LightPoint {
-        if !self.even.get(lane) {
+        if !self.uniform_mesh.get(lane) {
             return self.points[lane];
         }
         let position = Position::Surface { p: self.at.get(lane), n: self.n.get(lane) };
@@ -121,27 +121,28 @@ impl Scene {
         let mut found = Mask::NONE;
         let mut pdf = Lanes::ZERO;
         let Some(table) = self.emitter_choice.as_ref() else { return (found, pdf) };
-        let mut facets = [[[0.0f32; LANES]; 3]; 4];
+        let mut triangles = [[[0.0f32; LANES]; 3]; 4];
         let (mut second, mut density) = ([0.0f32; LANES], [0.0f32; LANES]);
-        (lights.delta, lights.far, lights.even, lights.sky) = (Mask::NONE, Mask::NONE, Mask::NONE, Mask::NONE);
+        (lights.delta, lights.far, lights.uniform_mesh, lights.envmap) =
+            (Mask::NONE, Mask::NONE, Mask::NONE, Mask::NONE);
         let mut above = Mask::NONE;
         for lane in active.lanes() {
             let (index, chance) = table.choose(from.p.get(lane), choice.0[lane]);
-            let lamp = &self.lamps[index];
-            if let Some(glow) = &lamp.glow {
-                let (triangle, rest) = glow.areas.sample(v.0[lane]);
-                let Facet { corner, sides, n } = glow.triangles[triangle];
-                for (to, from) in facets.iter_mut().zip([corner, sides[0], sides[1], n]) {
+            let info = &self.emitter_infos[index];
+            if let Some(mesh_light) = &info.mesh_light {
+                let (triangle, rest) = mesh_light.areas.sample(v.0[lane]);
+                let LightTriangle { corner, sides, n } = mesh_light.triangles[triangle];
+                for (to, from) in triangles.iter_mut().zip([corner, sides[0], sides[1], n]) {
                     (to[0][lane], to[1][lane], to[2][lane]) = from.into();
                 }
                 second[lane] = rest;
-                density[lane] = if lamp.density > 0.0 { lamp.density } else { chance / glow.area };
+                density[lane] = if info.density > 0.0 { info.density } else { chance / mesh_light.area };
                 lights.emitter.0[lane] = index as u32;
-                lights.even.set(lane, true);
+                lights.uniform_mesh.set(lane, true);
                 continue;
             }
             let (p, emitter) = (from.p.get(lane), &self.emitters[index]);
-            if self.map == Some(index as u32) {
+            if self.envmap == Some(index as u32) {
                 above.set(lane, true);
                 pdf.0[lane] = chance;
                 continue;
@@ -156,28 +157,28 @@ impl Scene {
             }
         }
         if let Some((index, map)) =
-            self.map.filter(|_| above.any()).and_then(|i| Some((i, self.emitters[i as usize].map()?)))
+            self.envmap.filter(|_| above.any()).and_then(|i| Some((i, self.emitters[i as usize].envmap()?)))
         {
             let sky = map.sample_packet([u, v], above);
             pdf = above.select(pdf * sky.pdf, pdf);
             for lane in above.lanes() {
-                lights.set_sky(lane, (sky.direction.get(lane), index), pdf.0[lane], sky.radiance.get(lane));
+                lights.set_envmap(lane, (sky.direction.get(lane), index), pdf.0[lane], sky.radiance.get(lane));
             }
             found = found | (above & pdf.greater(Lanes::ZERO));
         }
-        let even = lights.even;
-        if even.any() {
+        let uniform_mesh = lights.uniform_mesh;
+        if uniform_mesh.any() {
             let [corner, side, other_side, n] =
-                facets.map(|[x, y, z]| Lanes3 { x: Lanes(x), y: Lanes(y), z: Lanes(z) });
+                triangles.map(|[x, y, z]| Lanes3 { x: Lanes(x), y: Lanes(y), z: Lanes(z) });
             // Uniform over a triangle, as `warp::triangle`.
             let one = Lanes::splat(1.0);
             let root = (one - u).max(Lanes::ZERO).sqrt();
             let p = corner + side * (one - root) + other_side * (Lanes(second) * root);
-            lights.at = even.select3(p, lights.at);
-            lights.n = even.select3(n, lights.n);
-            lights.surface = lights.surface | even;
+            lights.at = uniform_mesh.select3(p, lights.at);
+            lights.n = uniform_mesh.select3(n, lights.n);
+            lights.surface = lights.surface | uniform_mesh;
             let (_, angle) = lights.seen_from(from.p);
-            let seen = even & angle.greater(Lanes::ZERO);
+            let seen = uniform_mesh & angle.greater(Lanes::ZERO);
             pdf = seen.select(Lanes(density) / angle, pdf);
             found = found | seen;
         }
@@ -188,13 +189,13 @@ impl Scene {
     #[inline(always)]
     pub fn light_radiance(&self, lights: &Lights, direction: Lanes3, active: Mask) -> Lanes3 {
         let mut radiance = Lanes3::ZERO;
-        for lane in (active & lights.even).lanes() {
-            let lamp = &self.lamps[lights.emitter.0[lane] as usize];
-            radiance.set(lane, lamp.glow.as_ref().map_or(Rgb::ZERO, |glow| glow.radiance));
+        for lane in (active & lights.uniform_mesh).lanes() {
+            let info = &self.emitter_infos[lights.emitter.0[lane] as usize];
+            radiance.set(lane, info.mesh_light.as_ref().map_or(Rgb::ZERO, |mesh_light| mesh_light.radiance));
         }
         radiance = lights.n.dot(direction).less(Lanes::ZERO).select3(radiance, Lanes3::ZERO);
-        radiance = lights.sky.select3(lights.sky_radiance, radiance);
-        for lane in (active & !(lights.even | lights.sky)).lanes() {
+        radiance = lights.envmap.select3(lights.envmap_radiance, radiance);
+        for lane in (active & !(lights.uniform_mesh | lights.envmap)).lanes() {
             radiance.set(lane, self.radiance(&lights.points[lane], -direction.get(lane)));
         }
         radiance
@@ -205,13 +206,13 @@ impl Scene {
     pub fn light_pdf(&self, lights: &Lights, (from, angle): (Lanes3, Lanes), active: Mask) -> Lanes {
         let mut density = Lanes::ZERO;
         let Some(table) = self.emitter_choice.as_ref() else { return density };
-        let quick = if table.constant(0).is_some() { lights.even } else { Mask::NONE };
+        let quick = if table.constant(0).is_some() { lights.uniform_mesh } else { Mask::NONE };
         for lane in (active & quick).lanes() {
-            density.0[lane] = self.lamps[lights.emitter.0[lane] as usize].density;
+            density.0[lane] = self.emitter_infos[lights.emitter.0[lane] as usize].density;
         }
         let mut pdf = angle.greater(Lanes::ZERO).select(density / angle, Lanes::ZERO);
-        pdf = lights.sky.select(lights.sky_pdf, pdf);
-        for lane in (active & !(quick | lights.sky)).lanes() {
+        pdf = lights.envmap.select(lights.envmap_pdf, pdf);
+        for lane in (active & !(quick | lights.envmap)).lanes() {
             pdf.0[lane] = self.emitter_pdf(from.get(lane), &lights.get(lane));
         }
         pdf
@@ -227,11 +228,11 @@ impl Scene {
     pub fn keep_light(&self, lights: &mut Lights, lane: usize, point: LightPoint, (radiance, pdf): (Rgb, f32)) {
         match point.position {
             // After a delta lobe its density is not asked for, so that the next paths' must be.
-            Position::Infinity { direction } if self.map == Some(point.emitter) => {
+            Position::Infinity { direction } if self.envmap == Some(point.emitter) => {
                 let pdf = if pdf > 0.0 { pdf } else { self.emitter_pdf(Vec3::ZERO, &point) };
-                lights.set_sky(lane, (direction, point.emitter), pdf, radiance);
+                lights.set_envmap(lane, (direction, point.emitter), pdf, radiance);
             }
-            _ => lights.set(lane, point, self.lamps[point.emitter as usize].glow.is_some()),
+            _ => lights.set(lane, point, self.emitter_infos[point.emitter as usize].mesh_light.is_some()),
         }
     }
 }

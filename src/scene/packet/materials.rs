@@ -2,7 +2,7 @@
 
 use std::f32::consts::{FRAC_1_PI, FRAC_PI_4};
 
-use super::{Finish, Surfaces};
+use super::{ShapeInfo, Surfaces};
 use crate::math::Rgb;
 use crate::math::lanes::{Bits, Lanes, Lanes3, Mask};
 use crate::math::vec2;
@@ -103,11 +103,12 @@ impl Scatters {
 
 impl Materials {
     /// Becomes the materials of the active ones of some surfaces.
-    pub fn look(&mut self, scene: &Scene, surfaces: &Surfaces, active: Mask) {
+    pub fn evaluate(&mut self, scene: &Scene, surfaces: &Surfaces, active: Mask) {
         (self.lambert, self.two_sided) = (Mask::NONE, Mask::NONE);
         self.roughness = Lanes::splat(f32::INFINITY);
         for lane in active.lanes() {
-            let Finish { lambert, two_sided, color, texture, .. } = &scene.finishes[surfaces.shape.0[lane] as usize];
+            let ShapeInfo { lambert, two_sided, color, texture, .. } =
+                &scene.shape_infos[surfaces.shape.0[lane] as usize];
             if !lambert {
                 let surface = surfaces.get(lane);
                 self.roughness.0[lane] = scene.bsdf(&surface).roughness(&surface).unwrap_or(-1.0);

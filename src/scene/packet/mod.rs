@@ -1,15 +1,15 @@
-//! Sixteen rays at a time: what they meet, what lights it and how it scatters.
+//! Sixteen rays at a time: the surfaces that they hit, the light that these receive and how they scatter it.
 //!
-//! What nearly every scene is made of, meshes of diffuse materials under evenly glowing meshes, is worked out for all rays
-//! together; everything else is asked of its own trait, ray by ray. Both have the same bits.
+//! Triangle meshes, diffuse materials and meshes of uniform radiance, which make up most of nearly every scene, are
+//! evaluated in lanes; everything else goes through the scalar traits, lane by lane. Both give the same bits.
 
-mod finish;
+mod info;
 mod lights;
 mod materials;
 mod rays;
 mod surfaces;
 
-pub(super) use self::finish::{Finish, Lamp};
+pub(super) use self::info::{EmitterInfo, ShapeInfo};
 pub use self::lights::Lights;
 pub use self::materials::{Evals, Materials, Scatters, disk};
 pub use self::rays::Rays;

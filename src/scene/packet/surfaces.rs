@@ -1,6 +1,6 @@
 //! Sixteen surfaces.
 
-use super::{Finish, Rays};
+use super::{Rays, ShapeInfo};
 use crate::ffi::embree::Hits;
 use crate::math::lanes::{Bits, LANES, Lanes, Lanes3, Mask};
 use crate::math::{Frame, Vec3, vec2};
@@ -60,8 +60,8 @@ pub struct Surfaces {
     pub epsilon: Lanes,
     /// Numbers of their shapes.
     pub shape: Bits,
-    /// Which glow; those that are met only.
-    pub glows: Mask,
+    /// Which mesh_light; those that are met only.
+    pub emissive: Mask,
     uv: [Lanes; 2],
     barycentric: [Lanes; 2],
     primitive: Bits,
@@ -79,7 +79,7 @@ impl Default for Surfaces {
             wi: zero,
             epsilon: Lanes::ZERO,
             shape: Bits::ZERO,
-            glows: Mask::NONE,
+            emissive: Mask::NONE,
             uv: [Lanes::ZERO; 2],
             barycentric: [Lanes::ZERO; 2],
             primitive: Bits::ZERO,
@@ -179,21 +179,21 @@ impl Scene {
     pub fn intersect_packet(&self, rays: &Rays, active: Mask, coherent: bool, surfaces: &mut Surfaces) -> Mask {
         let hits = self.accel.intersect_packet(rays, active, coherent);
         let found = !Bits(hits.geometry).equal(u32::MAX) & active;
-        let left = meshes((&self.shapes, &self.finishes), self.accel.size(), rays, &hits, found, surfaces);
+        let left = meshes((&self.shapes, &self.shape_infos), self.accel.size(), rays, &hits, found, surfaces);
         for lane in left.lanes() {
             let Some(hit) = hits.get(lane) else { continue };
             let mut one = self.accel.surface(&self.shapes, &hit, rays.get(lane));
             one.epsilon = self.epsilon(one.p);
             surfaces.set(lane, &one);
-            surfaces.glows.set(lane, self.finishes[one.at.shape as usize].emitter.is_some());
+            surfaces.emissive.set(lane, self.shape_infos[one.at.shape as usize].emitter.is_some());
         }
         found
     }
 
     /// Goes on to what camera rays show behind the emitters that they have met.
     pub fn pass_emitters(&self, rays: &Rays, met: &mut Mask, surfaces: &mut Surfaces) {
-        for lane in (*met & surfaces.glows).lanes() {
-            surfaces.glows.set(lane, false);
+        for lane in (*met & surfaces.emissive).lanes() {
+            surfaces.emissive.set(lane, false);
             match self.intersect_from_camera(rays.get(lane)) {
                 Some(surface) => surfaces.set(lane, &surface),
                 None => met.set(lane, false),
@@ -204,7 +204,7 @@ impl Scene {
     /// One of the surfaces as a point of its emitter, if it is one.
     #[inline]
     pub fn light_point_of(&self, surfaces: &Surfaces, lane: usize) -> Option<LightPoint> {
-        let emitter = self.finishes[surfaces.shape.0[lane] as usize].emitter?;
+        let emitter = self.shape_infos[surfaces.shape.0[lane] as usize].emitter?;
         Some(LightPoint::on_surface(&surfaces.get(lane), emitter))
     }
 
@@ -224,7 +224,7 @@ fn between(a: &Surfaces, b: &Surfaces) -> Rays {
 /// The surfaces of those hits that are on plain meshes; returns the others.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
 fn meshes(
-    (shapes, finishes): (&[Shape], &[Finish]),
+    (shapes, shape_infos): (&[Shape], &[ShapeInfo]),
     scene_size: f32,
     rays: &Rays,
     hits: &Hits,
@@ -232,25 +232,25 @@ fn meshes(
     surfaces: &mut Surfaces,
 ) -> Mask {
     let mut left = Mask::NONE;
-    surfaces.glows = Mask::NONE;
+    surfaces.emissive = Mask::NONE;
     let mut corners = [[[0.0f32; LANES]; 3]; 6];
     let mut side = [1.0f32; LANES];
     let (u, v) = (Lanes(hits.u), Lanes(hits.v));
     surfaces.uv = [u, v];
     for lane in found.lanes() {
         let number = hits.geometry[lane] as usize;
-        if hits.instance[lane] != u32::MAX || !finishes[number].mesh {
+        if hits.instance[lane] != u32::MAX || !shape_infos[number].mesh {
             left.set(lane, true);
             continue;
         }
-        surfaces.glows.set(lane, finishes[number].emitter.is_some());
+        surfaces.emissive.set(lane, shape_infos[number].emitter.is_some());
         let Geometry::Mesh(mesh) = &*shapes[number].geometry else { continue };
         let one = mesh.corners(hits.primitive[lane]);
         for (to, from) in corners.iter_mut().zip(one.p.iter().chain(&one.n)) {
             (to[0][lane], to[1][lane], to[2][lane]) = (*from).into();
         }
         side[lane] = mesh.side();
-        if finishes[number].uv {
+        if shape_infos[number].uv {
             let (u, v) = (hits.u[lane], hits.v[lane]);
             (surfaces.uv[0].0[lane], surfaces.uv[1].0[lane]) =
                 mesh.uv_at(hits.primitive[lane], [1.0 - u - v, u, v]).into();

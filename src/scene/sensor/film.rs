@@ -27,7 +27,7 @@ impl Film {
     pub fn load(object: &Object) -> Result<Self> {
         let dimension = |name: &str, default| {
             let value = object.integer(name, default)?;
-            usize::try_from(value).map_err(|_| object.place_of(name).invalid(format!("`{name}` cannot be negative")))
+            usize::try_from(value).map_err(|_| object.loc_of(name).invalid(format!("`{name}` cannot be negative")))
         };
         let (width, height) = (dimension("width", 768)?, dimension("height", 576)?);
         let (x, y) = (dimension("crop_offset_x", 0)?, dimension("crop_offset_y", 0)?);
@@ -36,7 +36,7 @@ impl Film {
         let fits = |offset: usize, crop: usize, full: usize| offset.checked_add(crop).is_some_and(|end| end <= full);
         if !fits(x, size.0, width) || !fits(y, size.1, height) {
             let what = format!("a crop window of {}x{} at {x},{y} in a film of {width}x{height}", size.0, size.1);
-            return Err(object.place.invalid(what));
+            return Err(object.loc.invalid(what));
         }
         object.ignore(&[
             "file_format",
@@ -54,7 +54,7 @@ impl Film {
             if let Value::Object(filter) = &property.value {
                 property.take();
                 if filter.class != "rfilter" {
-                    return Err(filter.place.unsupported(format!("a {} in a film", filter.class)));
+                    return Err(filter.loc.unsupported(format!("a {} in a film", filter.class)));
                 }
             }
         }
@@ -68,7 +68,7 @@ impl Film {
     }
 
     /// A point of the window as a point of the full film, both in [0, 1]².
-    pub fn place(&self, at: Vec2) -> Vec2 {
+    pub fn position(&self, at: Vec2) -> Vec2 {
         self.origin + at * self.extent
     }
 }

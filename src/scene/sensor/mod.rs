@@ -60,19 +60,19 @@ pub fn load(object: &Object, loader: &mut Loader, size: Option<(usize, usize)>, 
     let Some((_, parameters)) = PLUGINS.iter().find(|(name, _)| *name == object.plugin) else {
         let names: Vec<_> = PLUGINS.iter().map(|(name, _)| *name).collect();
         let what = format!("sensor `{}` is not known; there are {}", object.plugin, names.join(", "));
-        return Err(object.place.unsupported(what));
+        return Err(object.loc.unsupported(what));
     };
     let (film, spp) = film_and_spp(object, loader)?;
     let (width, height) = size.unwrap_or(film.size);
     let pixels = (width as u64).saturating_mul(height as u64);
     if pixels == 0 || pixels > max_pixels {
-        return Err(object.place.invalid(format!("a film of {width}x{height} pixels; it may have 1 to {max_pixels}")));
+        return Err(object.loc.invalid(format!("a film of {width}x{height} pixels; it may have 1 to {max_pixels}")));
     }
     // The window's own shape, were it as large as the whole film.
     let aspect = (width as f32 / film.extent.x) / (height as f32 / film.extent.y);
     let (near, far) = (object.float("near_clip", 1e-2)?, object.float("far_clip", 1e4)?);
     if !(near > 0.0 && far > near) {
-        return Err(object.place_of("near_clip").invalid(format!("clip planes at {near} and {far}")));
+        return Err(object.loc_of("near_clip").invalid(format!("clip planes at {near} and {far}")));
     }
     let projection = projection(object, far)?;
     let half_width = if let Projection::Parallel = projection { 1.0 } else { half_width(object, aspect)? };
@@ -110,11 +110,11 @@ fn film_and_spp(object: &Object, loader: &Loader) -> Result<(Film, u32)> {
                 nested.ignore(&["seed", "jitter", "scramble", "dimension"]);
                 nested.all_used("sample_count, seed, jitter, scramble, dimension")?;
             }
-            other => return Err(nested.place.unsupported(format!("a {other} in a sensor; it takes film and sampler"))),
+            other => return Err(nested.loc.unsupported(format!("a {other} in a sensor; it takes film and sampler"))),
         }
     }
     let spp = u32::try_from(spp).ok().filter(|&spp| spp > 0);
-    Ok((film, spp.ok_or_else(|| object.place.invalid("`sample_count` must be at least 1"))?))
+    Ok((film, spp.ok_or_else(|| object.loc.invalid("`sample_count` must be at least 1"))?))
 }
 
 fn projection(object: &Object, far: f32) -> Result<Projection> {
@@ -124,7 +124,7 @@ fn projection(object: &Object, far: f32) -> Result<Projection> {
             let (radius, focus) = (object.float("aperture_radius", 0.0)?, object.float("focus_distance", far)?);
             if object.get("aperture_radius").is_none() || radius < 0.0 || focus <= 0.0 {
                 let what = "`thinlens` needs an `aperture_radius` and a positive `focus_distance`";
-                return Err(object.place_of("aperture_radius").invalid(what));
+                return Err(object.loc_of("aperture_radius").invalid(what));
             }
             Ok(Projection::Lens { radius, focus })
         }
@@ -138,8 +138,8 @@ fn half_width(object: &Object, aspect: f32) -> Result<f32> {
     let focal_length = object.string("focal_length", "")?;
     if !focal_length.is_empty() {
         let millimetres = focal_length.trim_end_matches("mm").trim().parse::<f32>().ok().filter(|&f| f > 0.0);
-        let place = object.place_of("focal_length");
-        let millimetres = millimetres.ok_or_else(|| place.invalid(format!("`{focal_length}` is not like 50mm")))?;
+        let loc = object.loc_of("focal_length");
+        let millimetres = millimetres.ok_or_else(|| loc.invalid(format!("`{focal_length}` is not like 50mm")))?;
         // The diagonal of 35 mm film is the film's diagonal.
         return Ok(0.5 * 36f32.hypot(24.0) / millimetres / diagonal);
     }
@@ -149,9 +149,7 @@ fn half_width(object: &Object, aspect: f32) -> Result<f32> {
     let axis = object.choice("fov_axis", &axes, if object.get("fov").is_some() { 0 } else { 2 })?;
     let fov = object.float("fov", default)?;
     if !(fov > 0.0 && fov < 180.0) {
-        return Err(object
-            .place_of("fov")
-            .invalid(format!("a field of view of {fov} degrees; it must be in (0, 180)")));
+        return Err(object.loc_of("fov").invalid(format!("a field of view of {fov} degrees; it must be in (0, 180)")));
     }
     let half = (0.5 * fov.to_radians()).tan();
     Ok(match axes[axis] {
@@ -184,7 +182,7 @@ impl Sensor {
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
 fn view(sensor: &Sensor, [x, y]: [Lanes; 2], [lens_u, lens_v]: [Lanes; 2]) -> Rays {
     // Window to film and film to the plane at distance one are one scale and one shift together.
-    let (start, end) = (sensor.film.place(Vec2::ZERO), sensor.film.place(Vec2::ONE));
+    let (start, end) = (sensor.film.position(Vec2::ZERO), sensor.film.position(Vec2::ONE));
     let scale = -2.0 * (end - start) * sensor.half_extent / vec2(sensor.width as f32, sensor.height as f32);
     let shift = (Vec2::ONE - 2.0 * (start + sensor.principal_point)) * sensor.half_extent;
     let along = |at: Lanes, scale: f32, shift: f32| at * Lanes::splat(scale) + Lanes::splat(shift);

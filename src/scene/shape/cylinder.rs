@@ -21,7 +21,7 @@ fn make(object: &Object, loader: &mut Loader) -> Result<Geometry> {
     let side = if object.boolean("flip_normals", false)? { -1.0 } else { 1.0 };
     let axis = p1 - p0;
     if radius <= 0.0 || axis == Vec3::ZERO {
-        return Err(object.place.invalid("a cylinder needs a positive `radius` and two different ends"));
+        return Err(object.loc.invalid("a cylinder needs a positive `radius` and two different ends"));
     }
     let Frame { s, t, .. } = Frame::around(axis.normalize());
     let placed = Mat4::from_cols((s * radius).extend(0.0), (t * radius).extend(0.0), axis.extend(0.0), p0.extend(1.0));
@@ -30,7 +30,7 @@ fn make(object: &Object, loader: &mut Loader) -> Result<Geometry> {
     let skewed = |a: Vec3, b: Vec3| a.dot(b).abs() > 1e-3 * a.length() * b.length();
     if (x.length() - y.length()).abs() > 1e-3 * x.length() || skewed(x, y) || skewed(x, z) || skewed(y, z) {
         let what = "a cylinder that is sheared or scaled unevenly across its axis";
-        return Err(object.place_of("to_world").unsupported(what));
+        return Err(object.loc_of("to_world").unsupported(what));
     }
     loader.finite(object, Geometry::Cylinder(Cylinder { to_world, to_object: to_world.inverse(), side }))
 }

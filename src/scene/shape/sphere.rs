@@ -22,10 +22,10 @@ fn make(object: &Object, loader: &mut Loader) -> Result<Geometry> {
     let flip = object.boolean("flip_normals", false)?;
     let axes = [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| to_world.transform_vector3(axis).length());
     if axes.iter().any(|axis| (axis - axes[0]).abs() > 1e-3 * axes[0]) {
-        return Err(object.place_of("to_world").unsupported("a sphere scaled unevenly (an ellipsoid)"));
+        return Err(object.loc_of("to_world").unsupported("a sphere scaled unevenly (an ellipsoid)"));
     }
     if radius <= 0.0 || !radius.is_finite() {
-        return Err(object.place_of("radius").invalid("`radius` must be positive"));
+        return Err(object.loc_of("radius").invalid("`radius` must be positive"));
     }
     let mirrored = to_world.determinant() < 0.0;
     loader.finite(

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::sync::{Arc, OnceLock};
 
 use super::{Point, Texture};
-use crate::error::{Place, Result};
+use crate::error::{Result, SourceLoc};
 use crate::math::Rgb;
 use crate::scene::load::props::Object;
 use crate::scene::load::{Loader, Plugin};
@@ -16,11 +16,11 @@ pub const PLUGIN: Plugin<Arc<dyn Texture>> = Plugin { name: "mesh_attribute", pa
 fn make(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Texture>> {
     let name = object.string("name", "")?;
     if !name.starts_with("vertex_") && !name.starts_with("face_") {
-        return Err(object.place_of("name").invalid(format!("`{name}` is no `vertex_...` or `face_...` attribute")));
+        return Err(object.loc_of("name").invalid(format!("`{name}` is no `vertex_...` or `face_...` attribute")));
     }
     let scale = object.float("scale", 1.0)?;
     let shapes = Arc::new(OnceLock::new());
-    loader.attributes.push(Unbound { name, place: object.place.clone(), shapes: Arc::clone(&shapes) });
+    loader.attributes.push(Unbound { name, loc: object.loc.clone(), shapes: Arc::clone(&shapes) });
     Ok(Arc::new(MeshAttribute { shapes, scale }))
 }
 
@@ -30,21 +30,21 @@ type Shapes = Vec<Option<(Arc<Geometry>, usize)>>;
 /// An attribute that waits for all shapes to be known.
 pub struct Unbound {
     name: String,
-    place: Place,
+    loc: SourceLoc,
     shapes: Arc<OnceLock<Arc<Shapes>>>,
 }
 
 /// Looks the attributes up in every shape; one at least must have each.
 pub fn bind<'a>(attributes: Vec<Unbound>, geometries: impl Iterator<Item = &'a Arc<Geometry>> + Clone) -> Result<()> {
     let mut tables: HashMap<String, Arc<Shapes>> = HashMap::new();
-    for Unbound { name, place, shapes } in attributes {
+    for Unbound { name, loc, shapes } in attributes {
         let find = |geometry: &'a Arc<Geometry>| match &**geometry {
             Geometry::Mesh(mesh) => Some((Arc::clone(geometry), mesh.attribute(&name)?)),
             _ => None,
         };
         let table = tables.entry(name.clone()).or_insert_with(|| Arc::new(geometries.clone().map(find).collect()));
         if table.iter().all(Option::is_none) {
-            return Err(place.invalid(format!("no mesh has the attribute `{name}`")));
+            return Err(loc.invalid(format!("no mesh has the attribute `{name}`")));
         }
         shapes.get_or_init(|| Arc::clone(table));
     }

@@ -117,15 +117,15 @@ impl Texels {
             [texel(above + left), texel(above + right), texel(below + left), texel(below + right)]
         };
         match &self.samples {
-            Samples::Float(texels) => of(&|place| texels[place]),
+            Samples::Float(texels) => of(&|index| texels[index]),
             Samples::Byte(texels) => {
                 let table = decoded(raw);
-                of(&|place| {
-                    let [r, g, b] = texels[place];
+                of(&|index| {
+                    let [r, g, b] = texels[index];
                     vec3(table[r as usize], table[g as usize], table[b as usize])
                 })
             }
-            Samples::Cached { .. } => of(&|place| self.texel(place % self.width, place / self.width, raw)),
+            Samples::Cached { .. } => of(&|index| self.texel(index % self.width, index / self.width, raw)),
         }
     }
 }

@@ -49,13 +49,13 @@ fn make(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Bsdf>> {
 /// refract by, so the index is kept off one.
 fn relative_ior(object: &Object) -> Result<f32> {
     if object.get("eta").is_some() && object.get("specular").is_some() {
-        return Err(object.place_of("eta").invalid("give either `eta` or `specular`"));
+        return Err(object.loc_of("eta").invalid("give either `eta` or `specular`"));
     }
     let specular = object.float("specular", 0.5)?;
     let from_specular = 2.0 / (1.0 - (0.08 * specular.max(1e-3)).sqrt()) - 1.0;
     let eta = object.float("eta", from_specular)?;
     if !(eta > 0.0 && eta.is_finite()) {
-        return Err(object.place_of("eta").invalid("`eta` must be positive"));
+        return Err(object.loc_of("eta").invalid("`eta` must be positive"));
     }
     Ok(if eta == 1.0 { 1.001 } else { eta })
 }

@@ -6,7 +6,7 @@ mod serialized;
 
 use std::path::Path;
 
-use crate::error::{Place, Result};
+use crate::error::{Result, SourceLoc};
 use crate::math::{Rgb, Vec2, Vec3};
 
 /// A mesh as files give it, before it is placed in the world. Normals and texture coordinates are empty or
@@ -36,10 +36,10 @@ pub fn read(format: &str, bytes: &[u8], index: usize, path: &Path) -> Result<Mes
         "obj" => obj::read(bytes, path),
         "ply" => ply::read(bytes, path),
         "serialized" => serialized::read(bytes, index, path),
-        other => Err(Place::file(path).unsupported(format!("meshes of format `{other}`"))),
+        other => Err(SourceLoc::file(path).unsupported(format!("meshes of format `{other}`"))),
     }?;
     if mesh.positions.len() >= u32::MAX as usize {
-        return Err(Place::file(path).unsupported("a mesh of more than four billion vertices"));
+        return Err(SourceLoc::file(path).unsupported("a mesh of more than four billion vertices"));
     }
     Ok(mesh)
 }

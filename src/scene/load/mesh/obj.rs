@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use super::MeshData;
-use crate::error::{Place, Result};
+use crate::error::{Result, SourceLoc};
 use crate::math::{Vec2, Vec3, vec2, vec3};
 
 /// Position, texture coordinate and normal of a corner, as numbers from 0.
@@ -17,7 +17,7 @@ pub fn read(bytes: &[u8], path: &Path) -> Result<MeshData> {
     let text = String::from_utf8_lossy(bytes);
     let mut file = File::default();
     for (number, line) in (1..).zip(text.lines()) {
-        file.line(line).map_err(|what| Place::line(path, number).invalid(what))?;
+        file.line(line).map_err(|what| SourceLoc::line(path, number).invalid(what))?;
     }
     Ok(file.mesh)
 }

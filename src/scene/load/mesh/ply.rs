@@ -6,10 +6,10 @@ use ply_rs_bw::parser::{ParseError, Parser, Reader};
 use ply_rs_bw::ply::{ElementDef, Property, PropertyAccess, PropertyAccessResult, PropertyType};
 
 use super::MeshData;
-use crate::error::{Place, Result};
+use crate::error::{Result, SourceLoc};
 use crate::math::{Rgb, Vec3, vec2};
 
-/// Columns with a place of their own.
+/// Columns with a meaning of their own.
 const POSITION: &[&str] = &["x", "y", "z", "nx", "ny", "nz"];
 
 /// A vertex as the file has it; what it does not have stays zero.
@@ -133,15 +133,15 @@ fn attributes<'a>(
 
 /// Reads a mesh; faces with more than three corners become fans.
 pub fn read(bytes: &[u8], path: &Path) -> Result<MeshData> {
-    let place = Place::file(path);
+    let loc = SourceLoc::file(path);
     let mut reader = Reader::new(bytes);
-    let damaged = |error: ParseError| place.invalid(format!("not a readable PLY file: {error}"));
+    let damaged = |error: ParseError| loc.invalid(format!("not a readable PLY file: {error}"));
     let header = Parser::<Vertex>::new().read_header(&mut reader).map_err(damaged)?;
     let mut mesh = MeshData::default();
     for (name, element) in &header.elements {
         // Every entry takes at least one byte: a larger count is a damaged header.
         if element.count > bytes.len() {
-            return Err(place.invalid(format!("{} entries of `{name}` do not fit in the file", element.count)));
+            return Err(loc.invalid(format!("{} entries of `{name}` do not fit in the file", element.count)));
         }
         match name.as_str() {
             "vertex" => {
@@ -168,7 +168,7 @@ pub fn read(bytes: &[u8], path: &Path) -> Result<MeshData> {
                 for face in &faces {
                     let corner = |index: i64| {
                         let fits = usize::try_from(index).is_ok_and(|index| index < mesh.positions.len());
-                        let what = || place.invalid(format!("a face names vertex {index} of {}", mesh.positions.len()));
+                        let what = || loc.invalid(format!("a face names vertex {index} of {}", mesh.positions.len()));
                         if fits { Ok(index as u32) } else { Err(what()) }
                     };
                     let corners = face.corners.iter().copied().map(corner).collect::<Result<Vec<_>>>()?;

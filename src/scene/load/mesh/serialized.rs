@@ -9,7 +9,7 @@ use std::path::Path;
 use flate2::read::ZlibDecoder;
 
 use super::MeshData;
-use crate::error::{Place, Result};
+use crate::error::{Result, SourceLoc};
 use crate::math::{Vec2, Vec3};
 
 const IDENTIFIER: u16 = 0x041c;
@@ -22,8 +22,8 @@ const MAX_EXPANSION: u64 = 1100;
 
 /// Reads mesh number `index` from the bytes of a file.
 pub fn read(bytes: &[u8], index: usize, path: &Path) -> Result<MeshData> {
-    let place = Place::file(path);
-    let damaged = |what: &str| place.invalid(format!("not a readable serialized mesh: {what}"));
+    let loc = SourceLoc::file(path);
+    let damaged = |what: &str| loc.invalid(format!("not a readable serialized mesh: {what}"));
     let at = |offset: usize, n: usize| {
         let end = offset.checked_add(n).ok_or_else(|| damaged("an offset is out of range"))?;
         bytes.get(offset..end).ok_or_else(|| damaged("the file ends too early"))
@@ -37,11 +37,11 @@ pub fn read(bytes: &[u8], index: usize, path: &Path) -> Result<MeshData> {
     let word = match version {
         3 => 4,
         4 => 8,
-        other => return Err(place.unsupported(format!("serialized mesh version {other}; 3 and 4 are supported"))),
+        other => return Err(loc.unsupported(format!("serialized mesh version {other}; 3 and 4 are supported"))),
     };
     let count = u32_at(bytes.len().saturating_sub(4))? as usize;
     if index >= count {
-        return Err(place.invalid(format!("there is no mesh {index}: the file holds {count}")));
+        return Err(loc.invalid(format!("there is no mesh {index}: the file holds {count}")));
     }
     let entry = (bytes.len() - 4).checked_sub(word * (count - index)).ok_or_else(|| damaged("its table is cut off"))?;
     let offset = match word {

@@ -2,7 +2,7 @@
 
 mod cie;
 
-use crate::error::{Place, Result};
+use crate::error::{Result, SourceLoc};
 use crate::math::{Rgb, vec3};
 
 /// A quantity over wavelength.
@@ -21,10 +21,10 @@ const DAYLIGHT: f64 = 98.997_417_518_762_55;
 
 impl Spectrum {
     /// From a single number, or from `wavelength:value` pairs.
-    pub fn parse(text: &str, place: &Place) -> Result<Self> {
+    pub fn parse(text: &str, loc: &SourceLoc) -> Result<Self> {
         let number = |text: &str| {
             let parsed = text.trim().parse::<f64>().ok().filter(|value| value.is_finite());
-            parsed.ok_or_else(|| place.invalid(format!("`{text}` is not a finite number")))
+            parsed.ok_or_else(|| loc.invalid(format!("`{text}` is not a finite number")))
         };
         if !text.contains(':') {
             return Ok(Self::Uniform(number(text)? as f32));
@@ -32,32 +32,31 @@ impl Spectrum {
         let mut curve = Vec::new();
         for part in text.split(|c: char| c == ',' || c.is_whitespace()).filter(|part| !part.is_empty()) {
             let pair = part.split_once(':');
-            let (wavelength, value) =
-                pair.ok_or_else(|| place.invalid(format!("`{part}` is not `wavelength:value`")))?;
+            let (wavelength, value) = pair.ok_or_else(|| loc.invalid(format!("`{part}` is not `wavelength:value`")))?;
             curve.push([number(wavelength)?, number(value)?]);
         }
-        Self::curve(curve, place)
+        Self::curve(curve, loc)
     }
 
     /// From the lines of a file, each a wavelength and a value; `#` starts a comment.
-    pub fn parse_file(text: &str, place: &Place) -> Result<Self> {
+    pub fn parse_file(text: &str, loc: &SourceLoc) -> Result<Self> {
         let mut curve = Vec::new();
         for line in text.lines().map(str::trim).filter(|line| !line.is_empty() && !line.starts_with('#')) {
             let mut numbers = line.split_whitespace().map(str::parse::<f64>);
             match (numbers.next(), numbers.next()) {
                 (Some(Ok(wavelength)), Some(Ok(value))) => curve.push([wavelength, value]),
-                _ => return Err(place.invalid(format!("`{line}` is not a wavelength and a value"))),
+                _ => return Err(loc.invalid(format!("`{line}` is not a wavelength and a value"))),
             }
         }
-        Self::curve(curve, place)
+        Self::curve(curve, loc)
     }
 
-    fn curve(curve: Vec<[f64; 2]>, place: &Place) -> Result<Self> {
+    fn curve(curve: Vec<[f64; 2]>, loc: &SourceLoc) -> Result<Self> {
         if curve.as_flattened().iter().any(|value| !value.is_finite()) {
-            return Err(place.invalid("a spectrum holds a number that is not finite"));
+            return Err(loc.invalid("a spectrum holds a number that is not finite"));
         }
         if curve.is_empty() || curve.windows(2).any(|pair| pair[0][0] >= pair[1][0]) {
-            return Err(place.invalid("the wavelengths of a spectrum must rise"));
+            return Err(loc.invalid("the wavelengths of a spectrum must rise"));
         }
         Ok(Self::Curve(curve))
     }
@@ -126,7 +125,7 @@ mod tests {
     use super::*;
 
     fn parse(text: &str) -> Result<Spectrum> {
-        Spectrum::parse(text, &Place::file(Path::new("t")))
+        Spectrum::parse(text, &SourceLoc::file(Path::new("t")))
     }
 
     /// Expected colours are those that Mitsuba 3.9.1 shows for the same text.

@@ -1,0 +1,223 @@
+//! Edges between pixels: what a frame knows about differences, whichever neighbours they were sampled to.
+
+use super::BINS;
+use crate::image::Image;
+use crate::math::Rgb;
+
+/// Undirected edges between any two pixels of an image, in compressed rows: the edges of a row lead from a pixel to
+/// pixels of higher index. Indices of pixels run row by row. Values are those of the lower end towards the higher one:
+/// `mean[e]` estimates I(higher) - I(lower), in radiance.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Edges {
+    /// First edge of every pixel's row, and the number of edges.
+    rows: Vec<u32>,
+    /// Lower and higher end of every edge.
+    ends: Vec<[u32; 2]>,
+    /// Steps from lower to higher ends, in x and y.
+    offsets: Vec<(i32, i32)>,
+    /// Position of every edge's step in `offsets`.
+    kinds: Vec<u32>,
+    /// First entry of every pixel in `incident`, and the number of entries.
+    incident_rows: Vec<u32>,
+    /// Edges that have the pixel as an end, nearest ends first.
+    incident: Vec<u32>,
+    /// Means of all samples, in radiance.
+    pub mean: Vec<Rgb>,
+    /// Variances of the means, in squared radiance; empty unless asked for.
+    pub variance: Vec<Rgb>,
+    /// Samples that either end of an edge has at least; empty unless bins are asked for.
+    pub counts: Vec<u32>,
+    /// Means of the bins; empty unless asked for.
+    pub bins: Vec<[Rgb; BINS]>,
+    /// Means of the bins of the ambient light's differences; empty unless asked for.
+    pub ambient: Vec<[Rgb; BINS]>,
+    /// Weights of the neighbour's corrected value at the lower and at the higher end, against a weight of one of the
+    /// pixel's own value; empty unless whoever chose the edges gives some.
+    pub weights: Vec<[f32; 2]>,
+}
+
+/// The parts of edges that a method asks for besides their means.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct EdgeParts {
+    /// Variances of the means.
+    pub variance: bool,
+    /// Means of the bins.
+    pub bins: bool,
+    /// Means of the bins of the ambient light.
+    pub ambient: bool,
+}
+
+/// An edge seen from one of its ends.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HalfEdge {
+    /// Index of the edge.
+    pub edge: usize,
+    /// The pixel at the other end.
+    pub to: usize,
+    /// Sign of the edge's values in this direction: I(to) - I(here) = sign * mean.
+    pub sign: f32,
+}
+
+/// Differences to the right and downwards as dense images, for methods that work on a grid.
+#[derive(Clone, Copy, Debug)]
+pub struct Cross<'a> {
+    /// I(x + 1, y) - I(x, y) and I(x, y + 1) - I(x, y), in radiance; zero where there is no edge.
+    pub mean: [&'a Image; 2],
+    /// Variances of the means, in squared radiance, where the frame has them.
+    pub variance: [Option<&'a Image>; 2],
+}
+
+impl Edges {
+    /// Edges to the right (kind 0) and downwards (kind 1) from all pixels, without values.
+    pub fn cross((width, height): (usize, usize)) -> Self {
+        let mut ends = Vec::with_capacity(2 * width * height);
+        for i in 0..width * height {
+            if !(i + 1).is_multiple_of(width) {
+                ends.push([i as u32, i as u32 + 1]);
+            }
+            if i + width < width * height {
+                ends.push([i as u32, (i + width) as u32]);
+            }
+        }
+        Self::from_sorted((width, height), ends, vec![(1, 0), (0, 1)])
+    }
+
+    /// Edges between pairs of pixels, without values; a pair that occurs twice counts once, one of equal pixels not at
+    /// all.
+    pub fn new(size: (usize, usize), pairs: impl IntoIterator<Item = [usize; 2]>) -> Self {
+        let ordered = |[a, b]: [usize; 2]| [a.min(b) as u32, a.max(b) as u32];
+        let mut ends: Vec<_> = pairs.into_iter().filter(|[a, b]| a != b).map(ordered).collect();
+        ends.sort_unstable();
+        ends.dedup();
+        Self::from_sorted(size, ends, Vec::new())
+    }
+
+    fn from_sorted((width, height): (usize, usize), ends: Vec<[u32; 2]>, mut offsets: Vec<(i32, i32)>) -> Self {
+        let pixels = width * height;
+        let rows = starts(pixels, ends.iter().map(|ends| ends[0]));
+        let incident_rows = starts(pixels, ends.iter().flatten().copied());
+        let mut next = incident_rows.clone();
+        let mut incident = vec![0; 2 * ends.len()];
+        for (edge, &pixel) in ends.iter().enumerate().flat_map(|(edge, ends)| ends.iter().map(move |end| (edge, end))) {
+            incident[next[pixel as usize] as usize] = edge as u32;
+            next[pixel as usize] += 1;
+        }
+        let distance = |edge: &u32| ends[*edge as usize][1] - ends[*edge as usize][0];
+        for row in incident_rows.windows(2) {
+            // Stable, so that of two ends at the same distance the lower one comes first.
+            incident[row[0] as usize..row[1] as usize].sort_by_key(distance);
+        }
+        let mut kinds = Vec::with_capacity(ends.len());
+        let at = |pixel: u32| ((pixel as usize % width) as i32, (pixel as usize / width) as i32);
+        for &[lower, higher] in &ends {
+            let (from, to) = (at(lower), at(higher));
+            let offset = (to.0 - from.0, to.1 - from.1);
+            let kind = offsets.iter().position(|known| *known == offset).unwrap_or_else(|| {
+                offsets.push(offset);
+                offsets.len() - 1
+            });
+            kinds.push(kind as u32);
+        }
+        Self { rows, ends, offsets, kinds, incident_rows, incident, ..Self::default() }
+    }
+
+    /// Number of edges.
+    pub fn len(&self) -> usize {
+        self.ends.len()
+    }
+
+    /// Whether there is no edge.
+    pub fn is_empty(&self) -> bool {
+        self.ends.is_empty()
+    }
+
+    /// Number of pixels.
+    pub fn pixels(&self) -> usize {
+        self.rows.len() - 1
+    }
+
+    /// Lower and higher end of an edge.
+    #[inline(always)]
+    pub fn ends(&self, edge: usize) -> [usize; 2] {
+        self.ends[edge].map(|end| end as usize)
+    }
+
+    /// Steps in x and y from lower to higher ends; [`Edges::kind`] is a position in this list.
+    pub fn offsets(&self) -> &[(i32, i32)] {
+        &self.offsets
+    }
+
+    /// Position of an edge's step in [`Edges::offsets`].
+    #[inline(always)]
+    pub fn kind(&self, edge: usize) -> usize {
+        self.kinds[edge] as usize
+    }
+
+    /// Edges from a pixel to pixels of higher index, as a range of indices.
+    pub fn row(&self, pixel: usize) -> std::ops::Range<usize> {
+        self.rows[pixel] as usize..self.rows[pixel + 1] as usize
+    }
+
+    /// All edges of a pixel; those come first whose other end is nearest in index, of two the one of lower index.
+    #[inline(always)]
+    pub fn around(&self, pixel: usize) -> impl Iterator<Item = HalfEdge> {
+        let range = self.incident_rows[pixel] as usize..self.incident_rows[pixel + 1] as usize;
+        self.incident[range].iter().map(move |&edge| {
+            let [lower, higher] = self.ends(edge as usize);
+            let (to, sign) = if lower == pixel { (higher, 1.0) } else { (lower, -1.0) };
+            HalfEdge { edge: edge as usize, to, sign }
+        })
+    }
+
+    /// The edge from a pixel to another one, if there is one.
+    pub fn between(&self, from: usize, to: usize) -> Option<HalfEdge> {
+        let (lower, higher) = (from.min(to), from.max(to));
+        let edge = self.row(lower).find(|&edge| self.ends[edge][1] as usize == higher)?;
+        Some(HalfEdge { edge, to, sign: if from == lower { 1.0 } else { -1.0 } })
+    }
+
+    /// Whether the edges are those of [`Edges::cross`].
+    pub fn is_cross(&self, size: (usize, usize)) -> bool {
+        self.ends == Self::cross(size).ends
+    }
+}
+
+/// Where each of `count` rows starts, and where the last one ends, if they hold the given entries.
+fn starts(count: usize, entries: impl Iterator<Item = u32>) -> Vec<u32> {
+    let mut starts = vec![0; count + 1];
+    entries.for_each(|row| starts[row as usize + 1] += 1);
+    (0..count).for_each(|row| starts[row + 1] += starts[row]);
+    starts
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_cross_has_an_edge_for_every_pair_of_neighbours() {
+        for (width, height) in [(1, 1), (1, 5), (6, 1), (4, 3)] {
+            let edges = Edges::cross((width, height));
+            assert_eq!(edges.len(), (width - 1) * height + width * (height - 1), "{width}x{height}");
+            assert_eq!(edges.pixels(), width * height);
+            assert!(edges.is_cross((width, height)));
+            let degrees: usize = (0..edges.pixels()).map(|pixel| edges.around(pixel).count()).sum();
+            assert_eq!(degrees, 2 * edges.len());
+        }
+        let edges = Edges::cross((4, 3));
+        assert_eq!(edges.offsets(), [(1, 0), (0, 1)]);
+        let around: Vec<_> = edges.around(5).map(|half| (half.to, half.sign)).collect();
+        assert_eq!(around, [(4, -1.0), (6, 1.0), (1, -1.0), (9, 1.0)]);
+    }
+
+    #[test]
+    fn edges_between_any_pixels_are_found_from_both_ends() {
+        let edges = Edges::new((5, 4), [[7, 2], [2, 7], [3, 3], [0, 19], [12, 8]]);
+        assert_eq!((0..edges.len()).map(|edge| edges.ends(edge)).collect::<Vec<_>>(), [[0, 19], [2, 7], [8, 12]]);
+        assert_eq!(edges.offsets(), [(4, 3), (0, 1), (-1, 1)]);
+        assert_eq!(edges.between(7, 2), Some(HalfEdge { edge: 1, to: 2, sign: -1.0 }));
+        assert_eq!(edges.between(2, 7), Some(HalfEdge { edge: 1, to: 7, sign: 1.0 }));
+        assert_eq!((edges.between(3, 4), edges.row(8)), (None, 2..3));
+        assert!(!edges.is_cross((5, 4)));
+    }
+}

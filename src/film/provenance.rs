@@ -1,0 +1,95 @@
+//! Where an image comes from, as header attributes of its file.
+
+/// Header attributes of everything that is written; empty where something is not known.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Provenance {
+    /// Version of Fluxion.
+    pub version: String,
+    /// Name of the scene file.
+    pub scene: String,
+    /// Hash of the scene's text, in hexadecimal.
+    pub fingerprint: String,
+    /// Seeds of the random numbers, with spaces between them.
+    pub seed: String,
+    /// Mean number of samples per pixel.
+    pub spp: String,
+    /// Seconds of rendering.
+    pub seconds: String,
+    /// Reconstruction with its parameters.
+    pub method: String,
+    /// Summary of the plan: what was computed and what was left out.
+    pub plan: String,
+}
+
+/// Prefix of the attributes' names.
+const PREFIX: &str = "fluxion:";
+
+impl Provenance {
+    /// Names of the attributes, in the order of [`Provenance::values`].
+    pub const NAMES: [&'static str; 8] = [
+        "fluxion:version",
+        "fluxion:scene",
+        "fluxion:fingerprint",
+        "fluxion:seed",
+        "fluxion:spp",
+        "fluxion:seconds",
+        "fluxion:method",
+        "fluxion:plan",
+    ];
+
+    /// Provenance of something that this version of the program makes.
+    pub fn new() -> Self {
+        Self { version: env!("CARGO_PKG_VERSION").into(), ..Self::default() }
+    }
+
+    fn values(&mut self) -> [&mut String; 8] {
+        [
+            &mut self.version,
+            &mut self.scene,
+            &mut self.fingerprint,
+            &mut self.seed,
+            &mut self.spp,
+            &mut self.seconds,
+            &mut self.method,
+            &mut self.plan,
+        ]
+    }
+
+    /// Names and values of everything that is known.
+    pub fn attributes(&self) -> Vec<(String, String)> {
+        let mut copy = self.clone();
+        let pairs = Self::NAMES.into_iter().zip(copy.values());
+        pairs.filter(|(_, value)| !value.is_empty()).map(|(name, value)| (name.to_owned(), value.clone())).collect()
+    }
+
+    /// Reads the attributes of a file; others than [`Provenance::NAMES`] are ignored.
+    pub fn from_attributes(attributes: &[(String, String)]) -> Self {
+        let mut provenance = Self::default();
+        for (name, slot) in Self::NAMES.into_iter().zip(provenance.values()) {
+            if let Some((_, value)) = attributes.iter().find(|(other, _)| other == name) {
+                slot.clone_from(value);
+            }
+        }
+        provenance
+    }
+
+    /// Name of a further attribute of this kind.
+    pub fn name(key: &str) -> String {
+        format!("{PREFIX}{key}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn attributes_are_read_back_and_unknown_ones_are_left_out() {
+        let provenance = Provenance { seed: "3 4".into(), method: "l2".into(), ..Provenance::new() };
+        let mut attributes = provenance.attributes();
+        assert_eq!(attributes.len(), 3);
+        assert!(attributes.iter().all(|(name, _)| name.starts_with(PREFIX)));
+        attributes.push((Provenance::name("floor"), "1e-4".into()));
+        assert_eq!(Provenance::from_attributes(&attributes), provenance);
+    }
+}

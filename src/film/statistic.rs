@@ -1,0 +1,235 @@
+//! The table of statistics: everything that a film accumulates per pixel. Tiles, checkpoint files, merging and the memory
+//! of a film are driven by it; [`layer`](super::layer) says which images are developed from which statistic.
+
+use super::{BINS, EdgeNeed, Needs, Sample};
+
+/// Rows of [`STATISTICS`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Record {
+    Color,
+    Direct,
+    /// Albedo, normal and depth.
+    Surface,
+    Occlusion,
+    Position,
+    /// One end's share of the four differences.
+    Edges,
+    ColorBins,
+    EdgeBins,
+    AmbientBins,
+    AmbientEdgeBins,
+}
+
+/// A statistic of every pixel.
+pub(super) struct Statistic {
+    /// Number of values in a sample.
+    pub values: usize,
+    pub kind: Kind,
+    /// Whether it counts the samples with differences instead of all samples.
+    pub of_edges: bool,
+    /// Whether it takes no memory until a sample has a value other than zero.
+    pub sparse: bool,
+    /// Whether a film with these needs has it.
+    pub recorded: fn(Needs) -> bool,
+    accumulate: fn(Slot, &Sample),
+}
+
+/// How samples are accumulated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    /// Mean of every value, then sum of squared deviations of every value.
+    Moments,
+    /// Mean of every value in each bin, bin by bin.
+    Bins,
+}
+
+const fn moments(values: usize, recorded: fn(Needs) -> bool, accumulate: fn(Slot, &Sample)) -> Statistic {
+    Statistic { values, kind: Kind::Moments, of_edges: false, sparse: false, recorded, accumulate }
+}
+
+const fn bins(values: usize, recorded: fn(Needs) -> bool, accumulate: fn(Slot, &Sample)) -> Statistic {
+    Statistic { kind: Kind::Bins, ..moments(values, recorded, accumulate) }
+}
+
+const fn of_edges(statistic: Statistic) -> Statistic {
+    Statistic { of_edges: true, ..statistic }
+}
+
+/// Every statistic, in the order of [`Record`] and of checkpoint files.
+pub(super) const STATISTICS: [Statistic; 10] = [
+    moments(3, |_| true, |slot, sample| slot.add(sample.color.to_array())),
+    Statistic { sparse: true, ..moments(3, |_| true, |slot, sample| slot.add(sample.direct.to_array())) },
+    moments(7, |needs| needs.features, |slot, sample| slot.add(sample.features.surface())),
+    moments(1, |needs| needs.occlusion, |slot, sample| slot.add([sample.features.occlusion])),
+    moments(3, |needs| needs.position, |slot, sample| slot.add(sample.features.position.to_array())),
+    of_edges(moments(12, |needs| needs.edges.is_sampled(), |slot, sample| slot.add(sample.color_differences()))),
+    bins(3, |needs| needs.bins, |slot, sample| slot.add_to_bin(sample.color.to_array())),
+    of_edges(bins(
+        12,
+        |needs| needs.bins && needs.edges.is_sampled(),
+        |slot, sample| slot.add_to_bin(sample.color_differences()),
+    )),
+    bins(3, |needs| needs.ambient, |slot, sample| slot.add_to_bin(sample.ambient.to_array())),
+    of_edges(bins(
+        12,
+        |needs| needs.ambient && needs.edges.is_sampled(),
+        |slot, sample| slot.add_to_bin(sample.ambient_differences()),
+    )),
+];
+
+/// Number of a sample among those of its pixel, as the shares that means are updated with.
+#[derive(Clone, Copy)]
+pub(super) struct Ordinal {
+    /// One over the number of samples, this one included.
+    share: f32,
+    bin: usize,
+    /// One over the number of samples in its bin, this one included.
+    bin_share: f32,
+}
+
+impl Ordinal {
+    /// The sample that comes after `count` others.
+    pub fn after(count: u32) -> Self {
+        let count = count as usize;
+        Self { share: 1.0 / (count as u32 + 1) as f32, bin: count % BINS, bin_share: 1.0 / (count / BINS + 1) as f32 }
+    }
+}
+
+/// A pixel's values of one statistic, and the number of the sample to be added to them.
+pub(super) struct Slot<'a> {
+    values: &'a mut [f32],
+    ordinal: Ordinal,
+}
+
+impl Slot<'_> {
+    /// Updates means and sums of squared deviations (Welford 1962).
+    #[inline(always)]
+    fn add<const N: usize>(self, values: [f32; N]) {
+        let (means, deviations) = self.values.split_at_mut(N);
+        for ((mean, deviation), value) in means.iter_mut().zip(deviations).zip(values) {
+            let before = value - *mean;
+            *mean += before * self.ordinal.share;
+            *deviation += before * (value - *mean);
+        }
+    }
+
+    /// Updates the means of the sample's bin.
+    #[inline(always)]
+    fn add_to_bin<const N: usize>(self, values: [f32; N]) {
+        let means = &mut self.values[N * self.ordinal.bin..][..N];
+        means.iter_mut().zip(values).for_each(|(mean, value)| *mean += (value - *mean) * self.ordinal.bin_share);
+    }
+}
+
+impl Statistic {
+    /// Floats per pixel.
+    pub const fn stride(&self) -> usize {
+        match self.kind {
+            Kind::Moments => 2 * self.values,
+            Kind::Bins => BINS * self.values,
+        }
+    }
+
+    /// Adds a sample to pixel `index` of a plane.
+    pub fn add(&self, plane: &mut [f32], index: usize, ordinal: Ordinal, sample: &Sample) {
+        let values = &mut plane[index * self.stride()..][..self.stride()];
+        (self.accumulate)(Slot { values, ordinal }, sample);
+    }
+
+    /// Adds the `m` samples of `other` to the `n` samples of `mine`, as if they had been taken after them.
+    pub fn merge(&self, mine: &mut [f32], other: &[f32], n: u32, m: u32) {
+        match self.kind {
+            Kind::Moments => self.merge_moments(mine, other, n, m),
+            Kind::Bins => self.merge_bins(mine, other, n, m),
+        }
+    }
+
+    /// Pairwise update of means and sums of squared deviations (Chan et al. 1979).
+    fn merge_moments(&self, mine: &mut [f32], other: &[f32], n: u32, m: u32) {
+        let share = f64::from(m) / (f64::from(n) + f64::from(m));
+        let (means, deviations) = mine.split_at_mut(self.values);
+        let (other_means, other_deviations) = other.split_at(self.values);
+        for i in 0..self.values {
+            let (mean, deviation) = (f64::from(means[i]), f64::from(deviations[i]));
+            let distance = f64::from(other_means[i]) - mean;
+            means[i] = (mean + distance * share) as f32;
+            let between = distance * distance * f64::from(n) * share;
+            deviations[i] = (deviation + f64::from(other_deviations[i]) + between) as f32;
+        }
+    }
+
+    /// The first of the other samples belongs to the bin after that of our last one.
+    fn merge_bins(&self, mine: &mut [f32], other: &[f32], n: u32, m: u32) {
+        for (k, other) in other.chunks_exact(self.values).enumerate() {
+            let to = (n as usize + k) % BINS;
+            let (a, b) = (f64::from(bin_count(n, to)), f64::from(bin_count(m, k)));
+            let share = if b > 0.0 { (b / (a + b)) as f32 } else { 0.0 };
+            let means = &mut mine[self.values * to..][..self.values];
+            means.iter_mut().zip(other).for_each(|(mean, other)| *mean += (other - *mean) * share);
+        }
+    }
+
+    /// Variance of the mean of value `i`, from the moments of `n` samples. A single sample tells nothing of its
+    /// variance: it gets its own square rather than a certainty of zero.
+    pub fn variance_of_mean(&self, values: &[f32], i: usize, n: u32) -> f32 {
+        match n {
+            0 => 0.0,
+            1 => values[i] * values[i],
+            _ => (f64::from(values[self.values + i]) / (f64::from(n) * f64::from(n - 1))).max(0.0) as f32,
+        }
+    }
+}
+
+impl Record {
+    pub fn statistic(self) -> &'static Statistic {
+        &STATISTICS[self as usize]
+    }
+
+    /// Whether a film with these needs has the statistic.
+    pub fn is_recorded(self, needs: Needs) -> bool {
+        (self.statistic().recorded)(needs)
+    }
+
+    /// Whether the statistic is not recorded because all of its values are known to be zero.
+    pub fn is_known_zero(self, needs: Needs) -> bool {
+        let sampled = Needs { edges: EdgeNeed::Sampled, ..needs };
+        needs.edges == EdgeNeed::KnownZero && self.statistic().of_edges && self.is_recorded(sampled)
+    }
+}
+
+/// Samples in bin `k` of a pixel that has `n` of them: sample i is in bin i mod [`BINS`].
+pub fn bin_count(n: u32, k: usize) -> u32 {
+    (n + (BINS - 1 - k) as u32) / BINS as u32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_are_in_the_order_of_their_names() {
+        let names = [
+            (Record::Color, 3),
+            (Record::Direct, 3),
+            (Record::Surface, 7),
+            (Record::Occlusion, 1),
+            (Record::Position, 3),
+            (Record::Edges, 12),
+            (Record::ColorBins, 3),
+            (Record::EdgeBins, 12),
+            (Record::AmbientBins, 3),
+            (Record::AmbientEdgeBins, 12),
+        ];
+        assert_eq!(names.len(), STATISTICS.len());
+        for (k, (record, values)) in names.into_iter().enumerate() {
+            assert_eq!((record as usize, record.statistic().values), (k, values));
+        }
+        assert!(Record::Direct.statistic().sparse && Record::AmbientEdgeBins.statistic().of_edges);
+    }
+
+    #[test]
+    fn bins_share_the_samples_in_turn() {
+        let counts: Vec<u32> = (0..BINS).map(|k| bin_count(19, k)).collect();
+        assert_eq!(counts, [3, 3, 3, 2, 2, 2, 2, 2]);
+    }
+}

@@ -1,0 +1,35 @@
+//! Emitters that paths hit by scattering, weighted against next-event estimation (Veach 1997).
+
+use super::paths::Packet;
+use super::vertices::Vertices;
+use crate::math::Rgb;
+use crate::scene::Scene;
+use crate::scene::emitter::LightPoint;
+
+/// An emitter that a path has hit.
+pub struct EmitterHit {
+    /// The point of the emitter.
+    pub point: LightPoint,
+    /// Radiance that it sends back along the path.
+    pub radiance: Rgb,
+    /// Density per solid angle with which next-event estimation would have sampled it; 0 after a delta lobe.
+    pub light_pdf: f32,
+    /// MIS-weighted contribution to the sample's colour.
+    pub color: Rgb,
+}
+
+/// The emitter at the end of a path's latest segment: the surface that it has hit if `hit`, else the environment.
+pub fn emitter_hit(scene: &Scene, packet: &Packet, vertices: &Vertices, lane: usize, hit: bool) -> Option<EmitterHit> {
+    let direction = packet.rays.direction.get(lane);
+    let point = if hit { scene.light_point_of(&vertices.surfaces, lane) } else { scene.environment(direction) }?;
+    let radiance = scene.radiance(&point, -direction);
+    if radiance == Rgb::ZERO {
+        return None;
+    }
+    let smooth = packet.smooth.get(lane);
+    let light_pdf = if smooth { scene.emitter_pdf(packet.from.get(lane), &point) } else { 0.0 };
+    // Power heuristic with exponent two.
+    let ratio = light_pdf / packet.pdf.0[lane];
+    let color = packet.throughput.get(lane) * radiance / (1.0 + ratio * ratio);
+    Some(EmitterHit { point, radiance, light_pdf, color })
+}

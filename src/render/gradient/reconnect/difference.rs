@@ -1,0 +1,46 @@
+//! One end's share of a difference: (J f(y) - f(x)) / D, D being the sum of both paths' densities.
+
+use super::half_vector::OffsetEnd;
+use crate::math::lanes::{Lanes, Lanes3};
+
+/// Contributions of sixteen base paths: f(x) before division by `density`, the sum over the sampling strategies.
+#[derive(Clone, Copy)]
+pub struct Contributions {
+    pub base: Lanes3,
+    pub density: Lanes,
+    /// One over the Russian-roulette survival probability of the last segment.
+    pub inv_survival: Lanes,
+}
+
+impl Contributions {
+    /// Differences to contributions J f(y) with densities J p(y), both relative to the base's prefix; to zero where the
+    /// offset carries nothing.
+    #[inline(always)]
+    pub fn differences(&self, offset: Lanes3, density: Lanes) -> Lanes3 {
+        let pair = offset.nonzero() & density.greater(Lanes::ZERO);
+        let other = pair.select3(offset * self.inv_survival, Lanes3::ZERO);
+        let densities = self.density + pair.select(density, Lanes::ZERO);
+        (other - self.base) * (Lanes::splat(1.0) / densities)
+    }
+}
+
+/// Light that sixteen offsets receive over last segments of their own.
+#[derive(Clone, Copy)]
+pub struct OffsetEnds {
+    /// f cos at the offset's vertex times the radiance received, times dω' / dω; zero where nothing is received.
+    pub value: Lanes3,
+    /// Sum of the densities of sampling the emitter point and of hitting it by scattering, times dω' / dω.
+    pub density: Lanes,
+}
+
+impl OffsetEnds {
+    /// Nothing is received.
+    pub const NONE: Self = Self { value: Lanes3::ZERO, density: Lanes::ZERO };
+
+    /// Replaces one lane by the last segment of a single offset, if it has one.
+    pub fn set(&mut self, lane: usize, end: Option<OffsetEnd>) {
+        let Some(end) = end else { return };
+        self.value.set(lane, end.value * end.radiance * end.jacobian);
+        self.density.0[lane] = (end.light_pdf + end.pdf) * end.jacobian;
+    }
+}

@@ -1,0 +1,190 @@
+//! States of sixteen offset paths at the vertices of their base paths.
+
+use crate::math::lanes::{Bits, LANES, Lanes, Lanes3, Mask};
+use crate::math::{Rgb, Vec3};
+
+/// The prefix of an offset path relative to that of its base path.
+#[derive(Clone, Copy, Debug)]
+pub struct Prefix {
+    /// J f(y) / p(x).
+    pub throughput: Rgb,
+    /// J p(y) / p(x).
+    pub ratio: f32,
+}
+
+/// Sixteen prefixes.
+#[derive(Clone, Copy)]
+pub struct Prefixes {
+    /// J f(y) / p(x).
+    pub throughput: Lanes3,
+    /// J p(y) / p(x).
+    pub ratio: Lanes,
+}
+
+impl Prefixes {
+    /// Appends a segment with the given factors. Returns the lanes that carry light on, too.
+    #[inline(always)]
+    pub fn extended(&self, value: Lanes3, ratio: Lanes) -> (Self, Mask) {
+        let next = Self { throughput: self.throughput.scale(value), ratio: self.ratio * ratio };
+        let carried = next.throughput.nonzero() & next.ratio.greater(Lanes::ZERO);
+        (next, carried)
+    }
+
+    /// The prefix of one lane.
+    pub fn get(&self, lane: usize) -> Prefix {
+        Prefix { throughput: self.throughput.get(lane), ratio: self.ratio.0[lane] }
+    }
+}
+
+impl Prefix {
+    /// Appends a segment with the given factors; `None` if it carries nothing.
+    pub fn extended(self, value: Rgb, ratio: f32) -> Option<Self> {
+        let next = Self { throughput: self.throughput * value, ratio: self.ratio * ratio };
+        (next.throughput != Rgb::ZERO && next.ratio > 0.0).then_some(next)
+    }
+}
+
+/// State of an offset at a vertex of its base path.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(u32)]
+pub enum Kind {
+    /// Its pixel lies outside the film.
+    OutOfFilm,
+    /// The shift has failed.
+    Failed,
+    /// It has a vertex of its own.
+    Unconnected,
+    /// It reaches the base path's vertex from a vertex of its own.
+    JustConnected,
+    /// It is the base path from an earlier vertex on.
+    Connected,
+}
+
+/// Sixteen states.
+#[derive(Clone)]
+pub struct States {
+    kind: Bits,
+    /// Prefixes of the offsets.
+    pub prefix: Prefixes,
+    /// Indices of the vertices of unconnected offsets.
+    pub vertex_index: Bits,
+    /// Local directions that just connected offsets come from.
+    pub wi: Lanes3,
+}
+
+impl Default for States {
+    fn default() -> Self {
+        let prefix = Prefixes { throughput: Lanes3::ZERO, ratio: Lanes::ZERO };
+        Self { kind: Bits::ZERO, prefix, vertex_index: Bits::ZERO, wi: Lanes3::ZERO }
+    }
+}
+
+impl States {
+    /// Lanes in a state.
+    #[inline(always)]
+    pub fn are(&self, kind: Kind) -> Mask {
+        self.kind.equal(kind as u32)
+    }
+
+    /// Lanes whose pixel and neighbour both lie in the film.
+    #[inline(always)]
+    pub fn inside(&self) -> Mask {
+        !self.are(Kind::OutOfFilm)
+    }
+
+    #[inline(always)]
+    fn set(&mut self, lane: usize, kind: Kind, prefix: Prefix) {
+        self.kind.0[lane] = kind as u32;
+        self.prefix.throughput.set(lane, prefix.throughput);
+        self.prefix.ratio.0[lane] = prefix.ratio;
+    }
+
+    /// Copies one lane of other states.
+    pub fn copy(&mut self, lane: usize, from: &Self) {
+        self.set(lane, Kind::Failed, from.prefix.get(lane));
+        self.kind.0[lane] = from.kind.0[lane];
+        self.vertex_index.0[lane] = from.vertex_index.0[lane];
+        self.wi.set(lane, from.wi.get(lane));
+    }
+
+    /// The shift of one lane has failed.
+    #[inline(always)]
+    pub fn fail(&mut self, lane: usize) {
+        self.kind.0[lane] = Kind::Failed as u32;
+    }
+
+    /// One lane has a vertex of its own.
+    pub fn set_unconnected(&mut self, lane: usize, prefix: Prefix, vertex_index: u32) {
+        self.set(lane, Kind::Unconnected, prefix);
+        self.vertex_index.0[lane] = vertex_index;
+    }
+
+    /// One lane reaches the base path's vertex from the given local direction.
+    #[inline(always)]
+    pub fn set_just_connected(&mut self, lane: usize, prefix: Prefix, wi: Vec3) {
+        self.set(lane, Kind::JustConnected, prefix);
+        self.wi.set(lane, wi);
+    }
+
+    /// One lane is its base path from an earlier vertex on.
+    #[inline(always)]
+    pub fn set_connected(&mut self, lane: usize, prefix: Prefix) {
+        self.set(lane, Kind::Connected, prefix);
+    }
+}
+
+/// States at the vertices of one depth, over four edges. At a vertex an offset may be in different states for its light
+/// and for its continuation: a material with a diffuse and a specular lobe is connected to for the one and not for the
+/// other.
+#[derive(Default)]
+pub struct LevelStates {
+    /// States for the light sampled at the vertices.
+    for_light: Vec<[States; 4]>,
+    /// States for the continuation, where they differ.
+    for_scatter: Vec<[States; 4]>,
+    /// Lanes where they differ.
+    differs: Vec<[Mask; 4]>,
+}
+
+impl LevelStates {
+    /// States of the given number of packets, all of them out of the film.
+    pub fn reset(&mut self, packets: usize) {
+        self.for_light.resize_with(packets.max(self.for_light.len()), Default::default);
+        self.for_scatter.resize_with(packets.max(self.for_scatter.len()), Default::default);
+        self.differs.clear();
+        self.differs.resize(packets, [Mask::NONE; 4]);
+        self.for_light[..packets].iter_mut().flatten().for_each(|states| states.kind = Bits::ZERO);
+    }
+
+    /// States of a packet over an edge: for light and for the continuation.
+    pub fn get(&mut self, packet: usize, edge: usize) -> (&States, &States) {
+        let (states, differs) = (&self.for_light[packet][edge], self.differs[packet][edge]);
+        if !differs.any() {
+            return (states, states);
+        }
+        let for_scatter = &mut self.for_scatter[packet][edge];
+        for lane in (!differs).lanes() {
+            for_scatter.copy(lane, states);
+        }
+        (states, for_scatter)
+    }
+
+    /// Lanes of a packet with an offset, across any edge, that continues from a vertex of its own.
+    pub fn unconnected(&mut self, packet: usize) -> Mask {
+        (0..4).fold(Mask::NONE, |all, edge| all | self.get(packet, edge).1.are(Kind::Unconnected))
+    }
+
+    /// The state at a vertex for light and, where it does not differ, for the continuation.
+    #[inline(always)]
+    pub fn at(&mut self, vertex_index: u32, edge: usize) -> (&mut States, usize) {
+        let (packet, lane) = (vertex_index as usize / LANES, vertex_index as usize % LANES);
+        (&mut self.for_light[packet][edge], lane)
+    }
+
+    /// The state at a vertex for a continuation that differs.
+    pub fn at_for_scatter(&mut self, vertex_index: u32, edge: usize) -> (&mut States, usize) {
+        let (packet, lane) = (vertex_index as usize / LANES, vertex_index as usize % LANES);
+        self.differs[packet][edge].set(lane, true);
+        (&mut self.for_scatter[packet][edge], lane)
+    }
+}

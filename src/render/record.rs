@@ -1,0 +1,125 @@
+//! The recorder: what the paths of a wave have contributed so far, and the vertices that they consist of.
+
+use super::continuation::Shaded;
+use super::emission::{self, EmitterHit};
+use super::features::{self, FeatureWalk};
+use super::paths::Packet;
+use super::vertices::{Emission, Vertices};
+use crate::film::Sample;
+use crate::math::Rgb;
+use crate::math::lanes::{LANES, Mask};
+use crate::scene::Scene;
+
+/// The samples of a wave and their paths.
+#[derive(Default)]
+pub struct PathRecord {
+    /// Vertices by depth, sixteen by sixteen. Unless all are kept, the first entry holds those of the latest depth.
+    pub levels: Vec<Vec<Vertices>>,
+    /// Number of packets on every level of the latest wave.
+    pub packets: Vec<usize>,
+    /// Contributions and features so far, one sample for each path.
+    pub samples: Vec<Sample>,
+    /// Number of leading vertices of every path up to the last one that receives light.
+    pub lit_length: Vec<u32>,
+    walks: Vec<FeatureWalk>,
+}
+
+impl PathRecord {
+    /// Starts a wave of `count` paths.
+    pub fn start(&mut self, count: usize) {
+        fn reset<T: Default + Clone>(list: &mut Vec<T>, count: usize) {
+            list.clear();
+            list.resize(count, T::default());
+        }
+        reset(&mut self.samples, count);
+        reset(&mut self.lit_length, count);
+        reset(&mut self.walks, count);
+        self.packets.clear();
+    }
+
+    /// Adds the radiance of emitters that paths have hit by scattering, or seen from the camera: surfaces, or the
+    /// environment where a path has hit nothing. `recorded` is the level of the vertices if all levels are kept.
+    pub fn add_emission(
+        &mut self,
+        scene: &Scene,
+        depth: u32,
+        packet: &Packet,
+        (vertices, active, hit): (&Vertices, Mask, Mask),
+        recorded: Option<usize>,
+    ) {
+        let emissive = hit & vertices.surfaces.emissive;
+        let ends = if scene.has_environment() { active & (!hit | emissive) } else { active & emissive };
+        for lane in ends.lanes() {
+            let id = packet.id.0[lane] as usize;
+            let Some(found) = emission::emitter_hit(scene, packet, vertices, lane, hit.get(lane)) else { continue };
+            if depth == 0 {
+                let hidden = scene.integrator().hide_emitters;
+                self.samples[id].direct = if hidden { Rgb::ZERO } else { found.radiance };
+                continue;
+            }
+            self.samples[id].color += found.color;
+            self.lit_length[id] = depth;
+            if let Some(level) = recorded {
+                let parent = packet.parent.0[lane] as usize;
+                let vertices = &mut self.levels[level - 1][parent / LANES];
+                keep_emission(scene, vertices, parent % LANES, found);
+            }
+        }
+    }
+
+    /// Updates the features by the surfaces that active paths have come to.
+    pub fn describe(
+        &mut self,
+        scene: &Scene,
+        depth: u32,
+        packet: &Packet,
+        (vertices, active, hit): (&Vertices, Mask, Mask),
+    ) {
+        for lane in active.lanes() {
+            let id = packet.id.0[lane] as usize;
+            let (walk, features) = (&mut self.walks[id], &mut self.samples[id].features);
+            if depth == 0 {
+                *features = features::far(scene, packet.rays.get(lane));
+            }
+            if hit.get(lane) && !walk.is_done() {
+                let surface = (&vertices.surfaces, &vertices.materials, lane);
+                walk.visit(features, scene, surface, packet.rays.origin.get(lane));
+            }
+        }
+    }
+
+    /// Adds the light of next-event estimation at some vertices.
+    pub fn add_direct(&mut self, depth: u32, vertices: &Vertices, shaded: &Shaded) {
+        for lane in vertices.lit.lanes() {
+            let id = vertices.id.0[lane] as usize;
+            self.samples[id].color += shaded.color.get(lane);
+            self.lit_length[id] = depth + 1;
+        }
+        for lane in shaded.non_finite.lanes() {
+            self.samples[vertices.id.0[lane] as usize].color = Rgb::NAN;
+        }
+    }
+
+    /// Updates features and ambient light of the paths that continue from some vertices.
+    pub fn update_after_scatter(&mut self, vertices: &Vertices, ambient: bool) {
+        for lane in vertices.scattered.lanes() {
+            let id = vertices.id.0[lane] as usize;
+            if ambient {
+                let throughput = vertices.throughput.get(lane) * vertices.scatters.weight.get(lane);
+                self.samples[id].ambient += throughput / vertices.survival.0[lane];
+            }
+            if !self.walks[id].is_done() {
+                self.walks[id].pass(&vertices.scatters.get(lane));
+            }
+        }
+    }
+}
+
+/// Records the emitter that a path has hit with the vertex that it was scattered from.
+fn keep_emission(scene: &Scene, parent: &mut Vertices, lane: usize, hit: EmitterHit) {
+    parent.emits.set(lane, true);
+    let Emission { points, radiance, light_pdf } = &mut parent.emission;
+    scene.keep_light(points, lane, hit.point, (hit.radiance, hit.light_pdf));
+    radiance.set(lane, hit.radiance);
+    light_pdf.0[lane] = hit.light_pdf;
+}

@@ -1,0 +1,119 @@
+//! The path tracer: follows the paths of a wave from vertex to vertex, all of them together.
+
+use super::camera::CameraSamples;
+use super::continuation::shade;
+use super::paths::Paths;
+use super::record::PathRecord;
+use super::vertices::Vertices;
+use super::{Sampler, paths};
+use crate::film::Needs;
+use crate::math::lanes::{LANES, Lanes, Lanes3, Mask};
+use crate::math::{Rgb, Vec2};
+use crate::scene::{Integrator, Scene};
+
+/// Traces waves of paths; keeps its memory between them.
+pub struct PathTracer<'a> {
+    /// The scene.
+    pub scene: &'a Scene,
+    needs: Needs,
+    paths: Paths,
+    next: Paths,
+}
+
+impl<'a> PathTracer<'a> {
+    /// A tracer that computes what a film with these needs records.
+    pub fn new(scene: &'a Scene, needs: Needs) -> Self {
+        Self { scene, needs, paths: Paths::default(), next: Paths::default() }
+    }
+
+    /// Traces paths from `step` pixels beside the camera samples. `keep_all`: record the vertices of all depths instead of
+    /// the latest only.
+    pub fn trace(&mut self, camera: &CameraSamples, step: Vec2, keep_all: bool, record: &mut PathRecord) {
+        record.start(camera.pixels.len());
+        self.start(camera, step);
+        let mut depth = 0;
+        while self.paths.len() > 0 {
+            record.packets.push(self.paths.len().div_ceil(LANES));
+            let level = if keep_all { depth } else { 0 };
+            self.advance(camera.sampler, depth as u32, (level, keep_all), record);
+            std::mem::swap(&mut self.paths, &mut self.next);
+            depth += 1;
+        }
+    }
+
+    /// Starts a path at every camera sample.
+    fn start(&mut self, camera: &CameraSamples, step: Vec2) {
+        let count = camera.pixels.len();
+        self.paths.clear();
+        for first in (0..count).step_by(LANES) {
+            let hash = camera.hashes(first);
+            let rays = camera.rays(self.scene, first, hash, step);
+            for lane in 0..LANES.min(count - first) {
+                let (packet, _) = self.paths.push();
+                packet.id.0[lane] = (first + lane) as u32;
+                if lane == 0 {
+                    (packet.rays, packet.hash) = (rays, hash);
+                    (packet.throughput, packet.eta) = (Lanes3::splat(Rgb::ONE), Lanes::splat(1.0));
+                }
+            }
+        }
+    }
+
+    /// Takes all paths to their next vertices, which become level `at` of the record, and scatters them there.
+    fn advance(&mut self, sampler: Sampler, depth: u32, (at, keep_all): (usize, bool), record: &mut PathRecord) {
+        let Self { scene, needs, paths, next, .. } = self;
+        if record.levels.len() == at {
+            record.levels.push(Vec::new());
+        }
+        let mut level = std::mem::take(&mut record.levels[at]);
+        level.resize_with(level.len().max(paths.len().div_ceil(LANES)), Vertices::default);
+        next.clear();
+        for (k, (packet, active)) in paths.packets().enumerate() {
+            let vertices = &mut level[k];
+            arrive((scene, *needs), depth, (packet, active), (vertices, keep_all.then_some(at)), record);
+            if !vertices.hit.any() {
+                continue;
+            }
+            let shaded = shade((scene, &sampler), depth, packet, vertices, (k * LANES) as u32, next);
+            record.add_direct(depth, vertices, &shaded);
+            if describes(*needs) || needs.ambient {
+                record.update_after_scatter(vertices, needs.ambient);
+            }
+        }
+        record.levels[at] = level;
+    }
+}
+
+/// Whether paths have to describe the surfaces that they come to.
+fn describes(needs: Needs) -> bool {
+    needs.features || needs.occlusion || needs.position
+}
+
+/// Intersects the active paths of a packet, records emission and features, and leaves in `vertices.hit` the surfaces that
+/// paths may scatter at.
+fn arrive(
+    (scene, needs): (&Scene, Needs),
+    depth: u32,
+    (packet, active): (&paths::Packet, Mask),
+    (vertices, recorded): (&mut Vertices, Option<usize>),
+    record: &mut PathRecord,
+) {
+    let Integrator { max_depth, hide_emitters, .. } = scene.integrator();
+    let mut hit = scene.intersect_packet(&packet.rays, active, depth == 0, &mut vertices.surfaces);
+    if depth == 0 && hide_emitters {
+        scene.pass_emitters(&packet.rays, &mut hit, &mut vertices.surfaces);
+    }
+    if max_depth > 0 {
+        record.add_emission(scene, depth, packet, (vertices, active, hit), recorded);
+    }
+    vertices.materials.evaluate(scene, &vertices.surfaces, hit);
+    if describes(needs) {
+        record.describe(scene, depth, packet, (vertices, active, hit));
+    }
+    vertices.emits = Mask::NONE;
+    if depth + 1 >= max_depth {
+        vertices.hit = Mask::NONE;
+        return;
+    }
+    (vertices.hit, vertices.id, vertices.throughput) = (hit, packet.id, packet.throughput);
+}

@@ -1,0 +1,43 @@
+//! Counts of a scene's shapes and emitters, by which the plan says what can be left out.
+
+use super::Scene;
+
+/// Counts of shapes and emitters.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SceneStats {
+    /// Number of shapes.
+    pub shapes: usize,
+    /// Shapes whose material is a diffuse lobe and nothing else.
+    pub diffuse: usize,
+    /// Shapes whose texture coordinates are used.
+    pub textured: usize,
+    /// Shapes whose material perturbs shading normals, which needs derivatives of the surface.
+    pub perturbed: usize,
+    /// Number of emitters.
+    pub emitters: usize,
+    /// Emitters that are meshes of uniform radiance.
+    pub uniform_meshes: usize,
+}
+
+impl Scene {
+    /// Counts the scene's shapes and emitters.
+    pub fn stats(&self) -> SceneStats {
+        let count = |test: fn(&super::ShapeInfo) -> bool| self.shape_infos.iter().filter(|info| test(info)).count();
+        SceneStats {
+            shapes: self.shapes.len(),
+            diffuse: count(|info| info.lambert),
+            textured: count(|info| info.uv),
+            perturbed: self.shapes.iter().filter(|shape| shape.bsdf.needs_derivatives()).count(),
+            emitters: self.emitters.len(),
+            uniform_meshes: self.emitter_infos.iter().filter(|info| info.mesh_light.is_some()).count(),
+        }
+    }
+
+    /// Makes packets evaluate every material through its trait and look up all texture coordinates. Renders the same bits,
+    /// slower.
+    pub fn disable_fast_paths(&mut self) {
+        for info in &mut self.shape_infos {
+            (info.lambert, info.uv) = (false, true);
+        }
+    }
+}

@@ -1,0 +1,121 @@
+//! Films and files: threads do not matter, nothing is lost on disk, an independent reader sees the same.
+
+use crate::common::{bundled, film, sensor};
+use fluxion::film::{Layer, Needs, exr as layers};
+use fluxion::plan::Plan;
+
+fn on_threads(threads: usize) -> fluxion::film::Film {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+    pool.install(|| film(&bundled("glossy-metal", (37, 21)), 10, 3, Needs::ALL))
+}
+
+#[test]
+fn one_thread_and_two_give_the_same_bits() {
+    assert!(on_threads(1) == on_threads(2));
+}
+
+#[test]
+fn every_layer_survives_a_file_bit_for_bit() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("layers.exr");
+    let mut frame = film(&bundled("glossy-metal", (19, 23)), 9, 3, Needs::ALL).develop();
+    frame.provenance.seed = "3".into();
+    layers::save(&path, &frame).unwrap();
+    let back = layers::load(&path).unwrap();
+    assert_eq!(back.present().count(), Layer::COUNT);
+    assert!(back == frame);
+}
+
+/// The `exr` crate knows nothing of OpenImageIO.
+#[test]
+fn an_independent_reader_finds_the_channels_by_name() {
+    use exr::prelude::*;
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("layers.exr");
+    let frame = film(&bundled("unit/diffuse", (8, 6)), 4, 3, Needs::ALL).develop();
+    layers::save(&path, &frame).unwrap();
+    let image = read_first_flat_layer_from_file(&path).unwrap();
+    assert_eq!(image.layer_data.size, Vec2(8, 6));
+    for (layer, values) in frame.present() {
+        for (c, name) in layer.channel_names().iter().enumerate() {
+            let channel = image.layer_data.channel_data.list.iter().find(|channel| channel.name.to_string() == *name);
+            let FlatSamples::F32(samples) = &channel.unwrap_or_else(|| panic!("no {name}")).sample_data else {
+                panic!("{name} is not stored in full")
+            };
+            let expected: Vec<_> = values.data.iter().skip(c).step_by(values.channels).copied().collect();
+            assert_eq!(samples, &expected, "{name}");
+        }
+    }
+}
+
+/// A floor, and a wall at `x` beside the point that the camera looks at.
+fn corner(x: f32) -> fluxion::scene::Scene {
+    let sensor = sensor("3,4,0", 4, 3).replace("\"40\"", "\"0.01\"");
+    crate::common::scene(&format!(
+        r#"{sensor}
+        <emitter type="constant"/>
+        <shape type="rectangle"><transform name="to_world">
+            <rotate x="1" angle="-90"/><scale value="10"/></transform></shape>
+        <shape type="rectangle"><transform name="to_world">
+            <rotate y="1" angle="90"/><scale value="10"/><translate x="{x}"/></transform></shape>"#
+    ))
+}
+
+#[test]
+fn half_of_the_directions_are_open_beside_a_wall_and_all_of_them_in_the_open() {
+    let needs = Needs { features: true, occlusion: true, position: true, ..Needs::default() };
+    for (x, expected) in [(-0.02, 0.5), (-9.0, 1.0)] {
+        let frame = film(&corner(x), 1024, 1, needs).develop();
+        let open = frame.get(Layer::Occlusion).unwrap();
+        let mean = open.data.iter().sum::<f32>() / open.data.len() as f32;
+        assert!((mean - expected).abs() < 0.01, "{mean} instead of {expected}");
+        // The camera looks at the origin, from five units away; rays start a little before it.
+        assert!(frame.get(Layer::Position).unwrap().data.iter().all(|value| value.abs() < 0.01));
+        assert!(frame.get(Layer::Depth).unwrap().data.iter().all(|depth| (depth - 5.0).abs() < 0.02));
+    }
+}
+
+#[test]
+fn what_is_left_out_changes_no_bit_of_what_is_not() {
+    let names = ["cornell-box", "unit/rough-plastic", "unit/dielectric", "unit/bump", "unit/environment", "unit/lens"];
+    for name in names.into_iter().chain(["unit/instances", "unit/mask", "unit/sphere-light"]) {
+        let mut scene = bundled(name, (24, 18));
+        let (paths, edges) = (Needs::default(), Needs::EDGES);
+        let planned = [paths, edges].map(|needs| film(&scene, 9, 3, needs).develop());
+        scene.disable_fast_paths();
+        let all = film(&scene, 9, 3, Plan::all(&scene).needs).develop();
+        for planned in planned {
+            for layer in Layer::all().filter(|&layer| planned.get(layer).is_some()) {
+                assert_eq!(planned.get(layer), all.get(layer), "{name} {layer:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn the_plan_says_what_a_scene_can_do_without() {
+    let computed = |scene: &str, name: &str| {
+        let plan = Plan::new(&bundled(scene, (8, 6)), Needs::EDGES, Needs::default());
+        plan.items.iter().find(|item| item.name == name).unwrap().computed
+    };
+    for (what, without, with) in [
+        ("materials", "unit/diffuse", "unit/rough-plastic"),
+        ("half-vectors", "unit/diffuse", "unit/dielectric"),
+        ("derivatives", "unit/diffuse", "unit/bump"),
+        ("environment", "unit/diffuse", "unit/environment"),
+        ("offset-rays", "unit/diffuse", "unit/lens"),
+        ("emitters", "cornell-box", "unit/sphere-light"),
+    ] {
+        assert_eq!((computed(without, what), computed(with, what)), (false, true), "{what}");
+    }
+}
+
+#[test]
+fn what_nobody_needs_is_not_recorded() {
+    let scene = bundled("unit/diffuse", (8, 6));
+    let frame = film(&scene, 4, 1, Needs { features: true, bins: true, ..Needs::EDGES }).develop();
+    for layer in [Layer::Occlusion, Layer::Position, Layer::BinAmbient(0), Layer::BinAmbientDx(3)] {
+        assert!(frame.get(layer).is_none(), "{}", layer.name());
+    }
+    assert!(film(&scene, 4, 1, Needs::ALL).develop().present().count() == Layer::COUNT);
+}

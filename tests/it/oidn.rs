@@ -1,0 +1,45 @@
+//! Open Image Denoise, when it is built in: `cargo test --release --features oidn`.
+#![cfg(feature = "oidn")]
+
+use fluxion::film::{Frame, Layer};
+use fluxion::image::Image;
+use fluxion::math::{Rgb, rng, vec3};
+use fluxion::metrics;
+use fluxion::reconstruct::{Context, parse, solve};
+
+fn image(pixel: impl Fn(usize, usize) -> Rgb) -> Image {
+    Image::from_rgb(96, 64, pixel)
+}
+
+fn albedo(x: usize, y: usize) -> Rgb {
+    if (x / 24 + y / 16).is_multiple_of(2) { vec3(0.8, 0.7, 0.6) } else { vec3(0.2, 0.3, 0.5) }
+}
+
+#[test]
+fn noise_goes_whatever_the_options_and_lamps_stay() {
+    let truth = image(|x, y| albedo(x, y) * (0.5 + 0.005 * (x + y) as f32));
+    let mut direct = image(|_, _| Rgb::ZERO);
+    (20..30).for_each(|x| direct.pixel_mut(x, 30).fill(50.0));
+    let mut frame = Frame::new(96, 64);
+    let noise = |x, y, c| rng::unit(rng::combine(c, (y * 96 + x) as u64)) - 0.5;
+    let noisy = image(|x, y| truth.rgb(x, y) * (Rgb::ONE + vec3(noise(x, y, 1), noise(x, y, 2), noise(x, y, 3))));
+    frame.set(Layer::Color, noisy.clone());
+    frame.set(Layer::Direct, direct.clone());
+    frame.set(Layer::Albedo, image(albedo));
+    frame.set(Layer::Normal, image(|_, _| vec3(0.0, 0.0, 1.0)));
+    let mse = metrics::find("mse").unwrap();
+    let before = mse.measure(&noisy, &truth).unwrap().mean;
+    for method in ["oidn", "oidn:direct=off", "oidn:prefilter=accurate", "oidn:prefilter=accurate,direct=off"] {
+        let context = Context::QUIET;
+        let mut result = solve(parse(method).unwrap().as_ref(), &frame, &context).unwrap().image;
+        // The network dims a lamp of a single row; added afterwards it is as it was.
+        let (lamp, slack) = (result.pixel(25, 30)[1], if method.contains("direct=off") { 1.0 } else { 20.0 });
+        assert!((lamp - 50.0).abs() < slack, "{method}: {lamp}");
+        for x in 15..35 {
+            (25..36).for_each(|y| result.pixel_mut(x, y).copy_from_slice(&truth.rgb(x, y).to_array()));
+        }
+        let after = mse.measure(&result, &truth).unwrap().mean;
+        assert!(after < 0.1 * before, "{method}: {:.3} of the noise", after / before);
+    }
+    assert!(parse("oidn:prefilter=fast").err().unwrap().to_string().contains("none or accurate"));
+}
