@@ -1,4 +1,4 @@
-//! One error type for the whole library: what is wrong, where, and what to do about it.
+//! The error type of the library. Messages say what is wrong, where, and what to do about it.
 
 use std::fmt;
 use std::path::{Path, PathBuf};

@@ -1,5 +1,4 @@
-//! References: path-traced images of many samples with what is known of their own noise, as EXR files that can be
-//! worked on again and again.
+//! References: path-traced images of many samples with their own noise, as EXR files that can be continued.
 
 use std::path::Path;
 
@@ -191,7 +190,7 @@ fn not_one(path: &Path, why: &str) -> Error {
     Error::io(path, format!("is no reference made by `fluxion reference`: {why}"))
 }
 
-/// The scene's fingerprint as it stands in headers.
+/// The scene's fingerprint as in headers.
 pub fn fingerprint(scene: &Scene) -> String {
     format!("{:016x}", scene.fingerprint())
 }

@@ -24,8 +24,8 @@ const FIRST_SPP: u32 = 8;
 const FIRST_SHARE: f64 = 0.25;
 pub(super) const PASSES: u32 = 3;
 
-/// Share of the time that reconstructions between passes may take: what adaptive sampling gains at equal time is a
-/// multiple of this in every row of docs/adaptive.md.
+/// Share of the time that reconstructions between passes may take: less than adaptive sampling gains at equal time
+/// (docs/adaptive.md).
 const OVERHEAD: f64 = 0.1;
 
 /// Least and largest growth of the number of samples by a pass on the way to a target error: a pass of less than 15 %
@@ -57,20 +57,20 @@ pub struct Spent {
     pub reconstruction: f64,
 }
 
-/// The limits of a run, and what its decisions are made by.
+/// Limits of a run, and the inputs of its decisions.
 #[derive(Clone, Copy, Debug)]
 pub struct Budget {
     pub limits: Limits,
     /// Whether passes need a reconstruction with an estimated error.
     pub by_error: bool,
-    /// Whether all pixels get as many samples.
+    /// Whether all pixels get the same number of samples.
     pub uniform: bool,
 }
 
 /// Decision about the first pass.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum FirstPass {
-    /// So many samples of every pixel, with passes to follow.
+    /// The same number of samples for every pixel, with passes to follow.
     Uniform(u32),
     /// All samples evenly, since nothing is going to be decided; so many of every pixel before the speed is measured again.
     Everything(u32),

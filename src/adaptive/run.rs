@@ -1,4 +1,4 @@
-//! An adaptive run: carries out what the budget decides.
+//! An adaptive run: carries out the decisions of the budget.
 
 use std::sync::{Mutex, MutexGuard};
 use std::time::{Duration, Instant};

@@ -1,4 +1,4 @@
-//! A scene with what its images are measured against.
+//! A scene with its reference image.
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -12,7 +12,7 @@ use crate::scene::{Scene, load};
 pub struct Truth {
     /// Radiance, directly seen emitters included.
     pub image: Image,
-    /// Its own expected relMSE, where it is known.
+    /// Expected relMSE of the reference itself, if known.
     pub floor: Option<f64>,
 }
 
@@ -22,7 +22,7 @@ pub struct Case {
     pub name: String,
     /// The scene, at the reference's size.
     pub scene: Scene,
-    /// What its images are measured against.
+    /// The reference image that images are measured against.
     pub truth: Truth,
     /// Seconds that reading it and building the hierarchy took.
     pub load: f64,

@@ -1,4 +1,4 @@
-//! What one run leaves behind, and files of it.
+//! Records of runs, and files of them.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -29,7 +29,7 @@ pub struct Record {
     pub scene: String,
     /// The method with its parameters.
     pub method: String,
-    /// What was to be used up: `5s` or `64spp`.
+    /// Budget: `5s` or `64spp`.
     pub budget: String,
     /// Number of the seed.
     pub seed: u64,
@@ -55,7 +55,7 @@ pub struct Record {
     pub floor: Option<f64>,
     /// Processor, and threads that were used.
     pub machine: String,
-    /// Of Fluxion.
+    /// Version of Fluxion.
     pub version: String,
 }
 
@@ -66,7 +66,7 @@ pub struct LeftOut {
     pub scene: String,
     /// The method with its parameters.
     pub method: String,
-    /// What was to be used up.
+    /// Budget: `5s` or `64spp`.
     pub budget: String,
     /// Why.
     pub reason: String,
@@ -75,9 +75,9 @@ pub struct LeftOut {
 /// All runs so far.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Results {
-    /// Those that were made.
+    /// Runs that were made.
     pub records: Vec<Record>,
-    /// Those that were not.
+    /// Runs that were left out.
     pub left_out: Vec<LeftOut>,
 }
 

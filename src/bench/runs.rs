@@ -8,11 +8,11 @@ use super::record::LeftOut;
 use super::store::Store;
 use crate::error::Result;
 
-/// What is to be run.
+/// A set of runs: methods, budgets and seeds.
 pub struct Runs<'a> {
     /// Methods with their parameters.
     pub methods: &'a [String],
-    /// What each run may use up.
+    /// Budgets of the runs.
     pub budgets: &'a [Budget],
     /// How often everything is run.
     pub seeds: u64,

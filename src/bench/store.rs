@@ -13,7 +13,7 @@ use crate::reference::fingerprint;
 /// The folder.
 pub struct Store {
     folder: PathBuf,
-    /// What is in it.
+    /// Records in the folder.
     pub results: Results,
 }
 

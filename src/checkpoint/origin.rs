@@ -1,4 +1,4 @@
-//! Where a film comes from: the scene and settings that its samples belong to, and their numbers.
+//! Origin of a film: the scene and settings that its samples belong to, and their numbers.
 
 use std::fs::File;
 use std::io::Read;

@@ -33,7 +33,7 @@ pub struct Args {
     /// Runs of everything with different random numbers
     #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u64).range(1..1000))]
     seeds: u64,
-    /// Where references are: a file, a folder with files named after scenes, or `auto`: reference.exr beside the scene,
+    /// References: a file, a folder with files named after scenes, or `auto`: reference.exr beside the scene,
     /// or a file named after it in a folder `references` beside the scene's or in scenes/
     #[arg(long, default_value = "auto", value_name = "FILE|DIR")]
     reference: PathBuf,
@@ -46,7 +46,7 @@ pub struct Args {
     /// Go on with the results that are in the folder
     #[arg(long)]
     resume: bool,
-    /// Earlier results.json, to mark what got better and worse beyond the noise of the seeds
+    /// Earlier results.json, to mark improvements and regressions beyond the noise of the seeds
     #[arg(long, value_name = "FILE")]
     baseline: Option<PathBuf>,
     /// Threads to work with (0: one per core)
@@ -75,7 +75,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let mut names = Vec::new();
     for scene in &scenes {
         let case = load(args, scene)?;
-        // Fails on results that cannot be gone on with.
+        // Fails on results that cannot be continued.
         let _ = store.of(&case)?;
         check(&case, &budgets)?;
         if names.contains(&case.name) {
@@ -119,7 +119,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     Ok(if failed.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-/// Methods of a list. What follows a method's colon belongs to it as long as it looks like a parameter.
+/// Methods of a list. Parts after a method's colon belong to it as long as they look like parameters.
 fn methods(list: Option<&str>) -> Result<Vec<String>> {
     let mut methods: Vec<String> = Vec::new();
     match list {

@@ -19,7 +19,7 @@ use fluxion::scene::{Scene, bsdf, emitter, load, sensor, shape, texture};
 pub struct Args {
     /// Scene file to describe
     scene: Option<PathBuf>,
-    /// Method whose needs decide what is left out
+    /// Method whose needs the plan is made for
     #[arg(long, default_value = reconstruct::DEFAULT, value_name = "NAME[:KEY=VALUE,...]")]
     method: String,
     /// List the methods with their parameters
@@ -39,7 +39,7 @@ pub struct Args {
     define: Vec<(String, String)>,
 }
 
-/// Prints what is asked for.
+/// Prints the requested lists.
 pub fn run(args: &Args) -> Result<ExitCode> {
     if args.methods {
         methods();

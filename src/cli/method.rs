@@ -1,4 +1,4 @@
-//! What `render` and `reconstruct` have in common: a method, its image, and what it left on the way.
+//! Common part of `render` and `reconstruct`: the method, its image and its intermediate images.
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -20,7 +20,7 @@ pub struct Args {
     /// Megabytes that the reconstruction may use besides the layers; the image is the same
     #[arg(long, value_name = "MB", value_parser = clap::value_parser!(u64).range(1..1 << 40))]
     max_memory: Option<u64>,
-    /// Folder for the images that the method makes on its way, as EXR files
+    /// Folder for the intermediate images of the method, as EXR files
     #[arg(long, value_name = "DIR")]
     notes: Option<PathBuf>,
 }
@@ -56,7 +56,7 @@ impl Args {
         Ok(solution)
     }
 
-    /// What a reconstruction is given.
+    /// The context of a reconstruction.
     pub fn context<'a>(&self, progress: &'a dyn Fn(&str, f32)) -> Context<'a> {
         Context { progress, memory: self.max_memory.map(|megabytes| megabytes << 20), notes: self.notes.is_some() }
     }
@@ -65,7 +65,7 @@ impl Args {
     pub fn write_notes(&self, solution: &Solution, frame: &Frame) -> Result<()> {
         if let Some(folder) = &self.notes {
             if solution.notes.is_empty() {
-                eprintln!("warning: the method {} makes nothing on its way", self.method);
+                eprintln!("warning: the method {} has no intermediate images", self.method);
             }
             for note in &solution.notes {
                 io::write_color(
@@ -99,7 +99,7 @@ pub fn write(outputs: &[PathBuf], solution: &Solution, frame: &Frame, stats: &mu
     if failed.is_empty() {
         return Ok(());
     }
-    // What took hours is not to be lost for want of room in one place.
+    // An image that took hours must not be lost because one disk is full.
     let rescue = std::env::temp_dir().join(format!("fluxion-{}.exr", std::process::id()));
     if written.is_empty() && put(&rescue).is_ok() {
         written.push(rescue.display().to_string());

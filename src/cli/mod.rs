@@ -41,7 +41,7 @@ enum Command {
     Compare(compare::Args),
     /// Measure error against run time: scenes, methods, budgets, seeds
     Bench(bench::Args),
-    /// Render the reference image of a scene, in waves that can be gone on with
+    /// Render the reference image of a scene, in waves that can be continued
     Reference(reference::Args),
     /// Add up the samples of checkpoints, from other machines or seeds
     Merge(merge::Args),

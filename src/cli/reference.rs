@@ -18,7 +18,7 @@ use super::progress;
 pub struct Args {
     /// Scene file, Mitsuba 3 XML
     scene: PathBuf,
-    /// EXR file to write after every wave of up to 256 samples per pixel; one that is there already is gone on with
+    /// EXR file to write after every wave of up to 256 samples per pixel; an existing one is continued
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
     /// Stop when the estimated relMSE of the reference itself is at most this
@@ -33,7 +33,7 @@ pub struct Args {
     /// Film size in place of the scene's, as in 640x360
     #[arg(long, value_parser = super::parse_size, value_name = "WxH")]
     size: Option<(usize, usize)>,
-    /// Store half floats; going on from these loses a little of what there was
+    /// Store half floats; continuing from these loses some precision
     #[arg(long)]
     half: bool,
     /// Seed of the random numbers, another one than for the images that are to be judged
@@ -105,7 +105,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Fails if what is there cannot be gone on with.
+/// Fails if the existing reference cannot be continued.
 fn same(args: &Args, before: &Reference, size: (usize, usize)) -> Result<(), Error> {
     let there = (before.image.width, before.image.height);
     if there != size {

@@ -1,4 +1,4 @@
-//! What a run took, as one JSON object.
+//! Times, samples and memory of a run, as one JSON object.
 
 use std::path::Path;
 
@@ -36,9 +36,9 @@ pub struct Stats {
     pub peak_bytes: u64,
     /// Samples that were not finite.
     pub rejected: u64,
-    /// The method as it was asked for.
+    /// The method with its parameters.
     pub method: String,
-    /// What was computed and what was left out.
+    /// Summary of the plan.
     pub plan: String,
     /// Passes of adaptive sampling.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -46,7 +46,7 @@ pub struct Stats {
 }
 
 impl Stats {
-    /// Takes over what a render took.
+    /// Takes over times and counts of a render.
     pub fn rendered(&mut self, outcome: &RenderOutcome) {
         self.seconds.render = outcome.elapsed.as_secs_f64();
         let film = &outcome.film;

@@ -25,7 +25,7 @@ use std::sync::{Arc, Mutex};
 use super::raw::embree as raw;
 use crate::error::{Error, Result};
 
-/// Where a ray meets a surface first.
+/// The first intersection of a ray.
 pub use raw::FluxionHit as Hit;
 /// A disk or a cylinder.
 pub use raw::FluxionQuadric as Quadric;
@@ -33,13 +33,13 @@ pub use raw::FluxionQuadricKind as QuadricKind;
 /// A ray; `t` counts in units of the direction's length, which need not be one.
 pub use raw::FluxionRay as Ray;
 
-/// What sixteen rays met.
+/// First intersections of sixteen rays.
 pub use raw::FluxionHits as Hits;
 /// Sixteen rays, coordinate by coordinate.
 pub use raw::FluxionRays as Rays;
 
-/// What Embree's error callback has said, waiting to be fetched after the call that caused it.
-type Complaint = Mutex<Option<String>>;
+/// Messages of Embree's error callback, kept until the call that caused them has returned.
+type Reported = Mutex<Option<String>>;
 
 /// RTC_ERROR_OUT_OF_MEMORY.
 const OUT_OF_MEMORY: c_int = 4;
@@ -48,18 +48,18 @@ const OUT_OF_MEMORY: c_int = 4;
 struct DeviceHandle {
     raw: *mut c_void,
     /// Boxed: Embree holds its address.
-    complaint: Box<Complaint>,
+    reported: Box<Reported>,
 }
 
-// SAFETY: Embree's device and scene functions may be called from any thread; the complaint is behind a mutex.
+// SAFETY: Embree's device and scene functions may be called from any thread; the reported is behind a mutex.
 unsafe impl Send for DeviceHandle {}
 // SAFETY: as above.
 unsafe impl Sync for DeviceHandle {}
 
 impl DeviceHandle {
     fn check(&self) -> Result<()> {
-        let mut complaint = self.complaint.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-        complaint.take().map_or(Ok(()), |message| Err(Error::backend("embree", message)))
+        let mut reported = self.reported.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        reported.take().map_or(Ok(()), |message| Err(Error::backend("embree", message)))
     }
 }
 
@@ -71,9 +71,9 @@ impl Drop for DeviceHandle {
 }
 
 unsafe extern "C" fn remember(user: *mut c_void, code: c_int, message: *const c_char) {
-    // SAFETY: Embree passes back the complaint's address given at creation, and a NUL-terminated string.
-    let (complaint, message) = unsafe { (&*user.cast::<Complaint>(), CStr::from_ptr(message)) };
-    let mut slot = complaint.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+    // SAFETY: Embree passes back the reported's address given at creation, and a NUL-terminated string.
+    let (reported, message) = unsafe { (&*user.cast::<Reported>(), CStr::from_ptr(message)) };
+    let mut slot = reported.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
     let message = message.to_string_lossy();
     // Embree's own message says only that something failed.
     let memory = if code == OUT_OF_MEMORY { ": out of memory" } else { "" };
@@ -92,15 +92,15 @@ impl Device {
     /// A device with a configuration string in Embree's own syntax.
     pub fn with_config(config: &str) -> Result<Self> {
         let config = CString::new(config).map_err(|_| Error::backend("embree", "configuration holds a NUL byte"))?;
-        let complaint = Box::new(Mutex::new(None));
-        let user = std::ptr::from_ref::<Complaint>(&complaint).cast_mut().cast();
-        // SAFETY: the string lives through the call; the complaint is boxed and outlives the device.
+        let reported = Box::new(Mutex::new(None));
+        let user = std::ptr::from_ref::<Reported>(&reported).cast_mut().cast();
+        // SAFETY: the string lives through the call; the reported is boxed and outlives the device.
         let raw = unsafe { raw::fluxion_device_new(config.as_ptr(), Some(remember), user) };
         if raw.is_null() {
-            let message = complaint.lock().ok().and_then(|mut slot| slot.take());
+            let message = reported.lock().ok().and_then(|mut slot| slot.take());
             return Err(Error::backend("embree", message.unwrap_or_else(|| "out of memory".into())));
         }
-        let device = Self(Arc::new(DeviceHandle { raw, complaint }));
+        let device = Self(Arc::new(DeviceHandle { raw, reported }));
         device.0.check()?;
         Ok(device)
     }
@@ -120,7 +120,7 @@ impl Device {
     }
 }
 
-/// What a scene's geometry points into.
+/// Buffers that a scene's geometry refers to.
 enum Buffer {
     Triangles { _vertices: Arc<PaddedVertices>, _indices: Arc<Vec<[u32; 3]>> },
     Spheres { _spheres: Vec<[f32; 4]> },
@@ -136,7 +136,7 @@ impl Hit {
 }
 
 impl Hits {
-    /// What a ray has met.
+    /// First intersection of a ray, if any.
     #[inline]
     pub fn get(&self, lane: usize) -> Option<Hit> {
         (self.geometry[lane] != raw::FLUXION_NO_GEOMETRY).then(|| Hit {
@@ -300,7 +300,7 @@ impl Committed {
         }
     }
 
-    /// Which of sixteen rays meet anything: all bits of a word or none.
+    /// Occlusion of sixteen rays: all bits of a word are set or none.
     #[inline]
     pub fn occluded_packet(&self, rays: &Rays) -> [u32; 16] {
         let mut blocked = [0; 16];
@@ -385,9 +385,9 @@ mod tests {
     #[test]
     fn an_error_callback_surfaces_as_an_error() {
         let device = Device::new(1).unwrap();
-        // SAFETY: the callback gets the live complaint and a static string, as from Embree.
+        // SAFETY: the callback gets the live reported and a static string, as from Embree.
         unsafe {
-            remember(std::ptr::from_ref::<Complaint>(&device.0.complaint).cast_mut().cast(), 2, c"no room".as_ptr())
+            remember(std::ptr::from_ref::<Reported>(&device.0.reported).cast_mut().cast(), 2, c"no room".as_ptr())
         };
         assert_eq!(device.0.check().unwrap_err().to_string(), "embree: no room (error code 2)");
         assert!(device.0.check().is_ok());

@@ -10,8 +10,8 @@ const MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
 /// Names are at most this long, by the format.
 const MAX_NAME: u64 = 255;
 
-/// What is wrong with the first header of an EXR file, if something is. Other files are none of its business.
-pub fn complaint(path: &Path) -> io::Result<Option<String>> {
+/// Checks the first header of an EXR file; returns the fault, if there is one. Other files are not checked.
+pub fn validate(path: &Path) -> io::Result<Option<String>> {
     let file = File::open(path)?;
     let length = file.metadata()?.len();
     let mut from = BufReader::new(file);
@@ -55,7 +55,7 @@ mod tests {
         let path = folder.path().join("a");
         let found = |bytes: &[u8]| {
             std::fs::write(&path, bytes).unwrap();
-            complaint(&path).unwrap()
+            validate(&path).unwrap()
         };
         let header = |size: u8| [&MAGIC[..], &[2, 0, 0, 0], b"a\0int\0", &[size, 0, 0, 0], &[1, 2, 3, 4, 0]].concat();
         assert_eq!(found(&header(4)), None);

@@ -1,4 +1,4 @@
-//! What happens when there is no more memory: an error that says so, and what is kept, instead of an abort.
+//! Out of memory: an error message that says what is saved, instead of an abort.
 #![allow(unsafe_code)]
 
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -8,7 +8,7 @@ use std::sync::OnceLock;
 /// The system's allocator; when it fails, the program ends with an error and exit code 1.
 pub struct Allocator;
 
-/// What the error says besides.
+/// Second part of the error message.
 static KEPT: OnceLock<String> = OnceLock::new();
 
 /// Says what is kept when memory runs out. Only the first call counts.

@@ -49,7 +49,8 @@ pub struct Pixels {
 
 /// More samples than this in one file are taken for a damaged or hostile header.
 const MAX_SAMPLES: usize = 1 << 32;
-/// So are more than this for every byte of the file: no compression packs real pictures like that.
+/// More samples than this for every byte of the file are taken for a damaged header, too: no compression packs real
+/// pictures like that.
 const MAX_SAMPLES_PER_BYTE: usize = 1 << 11;
 
 /// An image file whose header has been read.
@@ -76,7 +77,7 @@ impl Drop for ImageFile<'_> {
 }
 
 fn check_header(path: &Path) -> Result<()> {
-    match exr_header::complaint(path) {
+    match exr_header::validate(path) {
         Ok(None) => Ok(()),
         Ok(Some(what)) => Err(Error::io(path, what)),
         Err(error) => Err(Error::io(path, error)),

@@ -1,4 +1,4 @@
-//! Edges between pixels: what a frame knows about differences, whichever neighbours they were sampled to.
+//! Edges between pixels: the differences that a frame holds, to whichever neighbours they were sampled.
 
 use super::BINS;
 use crate::image::Image;
@@ -158,7 +158,8 @@ impl Edges {
         self.rows[pixel] as usize..self.rows[pixel + 1] as usize
     }
 
-    /// All edges of a pixel; those come first whose other end is nearest in index, of two the one of lower index.
+    /// All edges of a pixel, in the order of the distance of their other ends in index; of two at the same distance the
+    /// lower end comes first.
     #[inline(always)]
     pub fn around(&self, pixel: usize) -> impl Iterator<Item = HalfEdge> {
         let range = self.incident_rows[pixel] as usize..self.incident_rows[pixel + 1] as usize;
@@ -182,7 +183,7 @@ impl Edges {
     }
 }
 
-/// Where each of `count` rows starts, and where the last one ends, if they hold the given entries.
+/// Start of each of `count` rows with the given entries, and the end of the last row.
 fn starts(count: usize, entries: impl Iterator<Item = u32>) -> Vec<u32> {
     let mut starts = vec![0; count + 1];
     entries.for_each(|row| starts[row as usize + 1] += 1);

@@ -40,7 +40,7 @@ pub struct Film {
     pub width: usize,
     /// Number of rows.
     pub height: usize,
-    /// What is recorded.
+    /// Statistics that are recorded.
     pub needs: Needs,
     tiles: Vec<Tile>,
 }

@@ -1,4 +1,4 @@
-//! What a film records: asked for by methods, decided by the plan.
+//! Statistics that a film records: asked for by methods, decided by the plan.
 
 use serde::{Deserialize, Serialize};
 
@@ -21,7 +21,7 @@ pub struct Needs {
     pub ambient: bool,
 }
 
-/// Where the differences between pixels come from.
+/// Origin of the differences between pixels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum EdgeNeed {

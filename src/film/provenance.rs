@@ -1,4 +1,4 @@
-//! Where an image comes from, as header attributes of its file.
+//! Provenance of images: scene, seed, samples, method and version, as header attributes of their files.
 
 /// Header attributes of everything that is written; empty where something is not known.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]

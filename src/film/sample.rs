@@ -87,7 +87,7 @@ impl Sample {
         finite(differences.color.iter().all(color), "edges")
     }
 
-    /// The sample that takes the place of a rejected one: zero, with as many differences.
+    /// The sample that replaces a rejected one: zero, with differences if the rejected one has some.
     pub(super) fn zeroed(&self) -> Self {
         Self { differences: self.differences.map(|_| Differences::default()), ..Self::default() }
     }

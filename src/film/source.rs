@@ -1,9 +1,9 @@
-//! Where the values of a layer come from: which statistic, and which of its values.
+//! Sources of layers: the statistic that a layer is developed from, and the position of its values in it.
 
 use super::Needs;
 use super::statistic::Record;
 
-/// Where a layer's values come from.
+/// Source of a layer's values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Source {
     SampleCount,

@@ -169,8 +169,8 @@ impl Statistic {
         }
     }
 
-    /// Variance of the mean of value `i`, from the moments of `n` samples. A single sample tells nothing of its
-    /// variance: it gets its own square rather than a certainty of zero.
+    /// Variance of the mean of value `i`, from the moments of `n` samples. A single sample says nothing about its
+    /// variance: its own square stands in, rather than a certainty of zero.
     pub fn variance_of_mean(&self, values: &[f32], i: usize, n: u32) -> f32 {
         match n {
             0 => 0.0,

@@ -1,4 +1,4 @@
-//! Images whose channels are apart, with a border all round: what filters work on.
+//! Images in separate planes with a mirrored border: the form that filters work on.
 
 use rayon::prelude::*;
 
@@ -45,7 +45,7 @@ impl Tile {
     }
 
     /// Puts values from column `x` of row `y` on into channel `c` of a tile, as [`Planes::from_tiles`] takes it;
-    /// what is beyond the last column is left out.
+    /// values beyond the last column are left out.
     #[inline(always)]
     pub fn put(&self, out: &mut [f32], c: usize, x: usize, y: usize, values: Lanes) {
         let count = LANES.min(self.width - x);
@@ -144,14 +144,14 @@ impl Planes {
 
     /// Values from a pixel on, at least a hundred of them; the row is followed by the border and the next row.
     #[inline(always)]
-    pub fn from(&self, c: usize, x: isize, y: isize) -> &[f32] {
+    pub fn tail_from(&self, c: usize, x: isize, y: isize) -> &[f32] {
         &self.planes[c][self.index(x, y)..]
     }
 
     /// [`LANES`] values of a row from column `x` on.
     #[inline(always)]
     pub fn lanes(&self, c: usize, x: isize, y: isize) -> Lanes {
-        Lanes::load(self.from(c, x, y))
+        Lanes::load(self.tail_from(c, x, y))
     }
 
     /// Rows of a plane without the border, to write in parallel. [`Planes::mirror_border`] must follow.

@@ -11,7 +11,7 @@ pub struct Alias {
 struct Cell {
     /// Share of the cell that is its own index's.
     own: f32,
-    /// Whose the rest is.
+    /// Entry that the rest of the cell belongs to.
     other: u32,
     /// Probability of its own index over all cells.
     probability: f32,
@@ -38,7 +38,7 @@ impl Alias {
                 small.push(high);
             }
         }
-        // What rounding has left over: without weight it must not be drawn at all.
+        // Left over by rounding: without weight it must not be drawn at all.
         let heaviest = (0..weights.len()).max_by(|&a, &b| weights[a].total_cmp(&weights[b]))? as u32;
         for index in small.into_iter().filter(|&index| weights[index] == 0.0) {
             cells[index] = Cell { own: 0.0, other: heaviest, ..cells[index] };
@@ -46,7 +46,7 @@ impl Alias {
         Some(Self { cells })
     }
 
-    /// The index that `u` in [0, 1) falls on, and `u` stretched to [0, 1) over what it falls on for further use.
+    /// The index that `u` in [0, 1) selects, and `u` rescaled to [0, 1) within that entry, for reuse.
     #[inline]
     pub fn sample(&self, u: f32) -> (usize, f32) {
         let at = u * self.cells.len() as f32;

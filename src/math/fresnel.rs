@@ -3,7 +3,7 @@
 
 use super::{Rgb, Vec3, vec3};
 
-/// What a smooth dielectric interface does with a direction.
+/// Reflection and refraction of a direction at a smooth dielectric interface.
 #[derive(Clone, Copy, Debug)]
 pub struct Dielectric {
     /// Reflected share of unpolarised light, in [0, 1].
@@ -72,7 +72,7 @@ pub fn reflect_about(wi: Vec3, m: Vec3) -> Vec3 {
     2.0 * wi.dot(m) * m - wi
 }
 
-/// Refracts `wi` at +z, with what [`dielectric`] found for it.
+/// Refracts `wi` at +z, with the result of [`dielectric`].
 pub fn refract(wi: Vec3, cos_t: f32, eta_ti: f32) -> Vec3 {
     vec3(-eta_ti * wi.x, -eta_ti * wi.y, cos_t)
 }

@@ -22,7 +22,7 @@ pub struct Measure {
 pub struct Metric {
     /// Key in reports.
     pub id: &'static str,
-    /// What it is.
+    /// Description for tables.
     pub summary: &'static str,
     /// Measures an image against a reference; called through [`measure`] only.
     measure: fn(&Image, &Image) -> Measure,

@@ -8,7 +8,7 @@ use crate::image::planes::Planes;
 pub enum Missing {
     /// Zero.
     Zero,
-    /// Where the image ends the nearest edge's value; elsewhere such edges are left out of the mean.
+    /// The nearest edge's value at the image's border; elsewhere missing edges are left out of the mean.
     Nearest,
 }
 

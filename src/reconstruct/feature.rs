@@ -1,5 +1,5 @@
-//! The feature generated from differences, as an image: a screened Poisson reconstruction in which everything counts by
-//! its variance, cleaned of what noise is left.
+//! The feature generated from differences, as an image: a screened Poisson reconstruction with inverse variances as weights,
+//! cleaned of the noise that is left.
 
 use super::generated::{self, Options};
 use super::inputs::{Inputs, check_memory};

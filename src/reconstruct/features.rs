@@ -1,4 +1,4 @@
-//! Albedo and normal: cleaned of their own noise, and what counts as alike in them.
+//! Albedo and normal as guides: cleaned of their own noise, with the differences that are tolerated.
 
 use super::inputs::Inputs;
 use crate::error::Result;
@@ -9,7 +9,7 @@ use crate::math::lanes::Lanes;
 
 /// A feature of three channels.
 pub struct Feature {
-    /// Which one.
+    /// Kind of the feature.
     pub kind: Kind,
     /// The values.
     pub mean: Planes,
@@ -56,7 +56,7 @@ impl Feature {
         Self { kind, mean: planes.part(0, 3), variance: planes.part(3, 1) }
     }
 
-    /// What pixels are compared by: differences of up to the noise, or to those between neighbours, are tolerated.
+    /// The feature as a guide of filters. Differences up to the noise, or up to those between neighbours, are tolerated.
     pub fn guide(&self) -> Guide {
         let mean = &self.mean;
         let tolerance = Planes::from_fn(mean.width, mean.height, 1, |_, x, y| {

@@ -33,9 +33,9 @@ pub struct Options {
 /// The variances that differences are weighted by.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Variances {
-    /// Of all samples, averaged over 3x3 pixels; the same in every round.
+    /// Variances of all samples, averaged over 3x3 pixels; the same in every round.
     Samples,
-    /// Of the bins that were drawn, pixel by pixel.
+    /// Variances of the drawn bins, pixel by pixel.
     Draws,
 }
 
@@ -250,7 +250,7 @@ fn draw(round: u32, which: u64) -> Draw {
 /// Means of the bins of colours and of differences.
 struct Groups<'a> {
     color: Vec<&'a [f32]>,
-    /// Those of the ambient light, if it is on.
+    /// Means of the ambient light's bins, if it is on.
     ambient_color: Vec<&'a [f32]>,
     samples: &'a [f32],
     edges: &'a Edges,

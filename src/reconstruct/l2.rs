@@ -2,7 +2,8 @@
 //! differences are nearest to the sampled ones without straying from the sampled colour,
 //! min |α (I - colour)|² + |Dx I - dx|² + |Dy I - dy|².
 //!
-//! It is linear in its data, so the result is as unbiased as they are, and keeps the mean. Values may be negative.
+//! The result is linear in colours and differences, so it is as unbiased as they are, and keeps the mean. Values may be
+//! negative.
 //! Differences to the right and downwards are solved for exactly by cosine transforms, edges between other pixels by
 //! multigrid.
 

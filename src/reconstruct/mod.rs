@@ -105,7 +105,7 @@ pub struct Traits {
 /// How far a method trusts differences.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum EdgeTrust {
-    /// It takes none.
+    /// No differences are used.
     Unused,
     /// Whatever their variances say.
     Always,

@@ -1,4 +1,4 @@
-//! What a camera path tells of the surface it shows: colour, normal, distance, how open it lies.
+//! Features of camera paths: albedo, normal, depth, position and ambient occlusion of the surface that a pixel shows.
 
 use crate::film::Features;
 use crate::math::frame::Frame;
@@ -7,7 +7,7 @@ use crate::scene::bsdf::{BsdfSample, Lobe};
 use crate::scene::packet::{Materials, Surfaces};
 use crate::scene::{Ray, Scene};
 
-/// Follows a path to the first surface with a smooth lobe, keeping the colour of what it passes.
+/// State of the search for a path's first surface with a smooth lobe, with the throughput of the delta lobes before it.
 #[derive(Clone, Copy, Default)]
 pub struct FeatureWalk {
     found: bool,
@@ -16,12 +16,12 @@ pub struct FeatureWalk {
 }
 
 impl FeatureWalk {
-    /// Whether it has been found.
+    /// Whether the surface has been found.
     pub fn is_done(&self) -> bool {
         self.found
     }
 
-    /// Comes to a surface from the point given.
+    /// Visits a surface that the path reaches from the given point.
     pub fn visit(
         &mut self,
         features: &mut Features,
@@ -32,7 +32,7 @@ impl FeatureWalk {
         let smooth = materials.smooth().get(lane);
         let p = surfaces.p.get(lane);
         self.length += p.distance(from);
-        // The first surface stands in until a better one is found.
+        // The first surface is taken until one with a smooth lobe is found.
         if smooth || self.tint.is_none() {
             let tint = self.tint.unwrap_or(Rgb::ONE);
             let side = if surfaces.wi.z.0[lane] < 0.0 { -1.0 } else { 1.0 };
@@ -43,9 +43,9 @@ impl FeatureWalk {
         self.found = smooth;
     }
 
-    /// Goes on through the surface.
+    /// Continues through a delta lobe.
     pub fn pass(&mut self, scattered: &BsdfSample) {
-        // What a boundary squeezes radiance by is not its colour.
+        // The change of radiance at a refracting boundary is not part of its colour.
         let color = match scattered.lobe {
             Lobe::DeltaTransmit => scattered.weight * (scattered.eta * scattered.eta),
             _ => scattered.weight,
@@ -54,19 +54,19 @@ impl FeatureWalk {
     }
 }
 
-/// Ambient occlusion reaches so far, over the size of the scene.
-const OPEN: f32 = 0.1;
+/// Range of ambient occlusion, as a share of the scene's size.
+const RANGE: f32 = 0.1;
 
-/// Whether a direction from the features' surface, chosen by its cosine, is open: 1 or 0.
+/// 1 if a cosine-distributed direction from the features' surface is unoccluded, else 0.
 pub fn occlusion(scene: &Scene, features: &Features, u: Vec2) -> f32 {
     if features.normal == Vec3::ZERO {
         return 1.0;
     }
     let direction = Frame::around(features.normal).to_world(warp::cosine_hemisphere(u));
-    f32::from(u8::from(scene.is_unoccluded(features.position, features.normal, direction, OPEN)))
+    f32::from(u8::from(scene.is_unoccluded(features.position, features.normal, direction, RANGE)))
 }
 
-/// The features of a ray that meets nothing: beyond everything.
+/// Features of a camera ray that hits nothing: a point beyond the scene.
 pub fn far(scene: &Scene, Ray { origin, direction, .. }: Ray) -> Features {
     let (center, radius) = scene.bounds().sphere();
     let depth = origin.distance(center) + radius;

@@ -1,4 +1,4 @@
-//! Paths on their way, packed sixteen by sixteen so that those that have ended leave no gaps.
+//! Paths between two vertices, packed sixteen by sixteen, so that terminated paths leave no gaps.
 
 use crate::math::lanes::{Bits, LANES, Lanes, Lanes3, Mask};
 use crate::scene::packet::Rays;
@@ -6,23 +6,23 @@ use crate::scene::packet::Rays;
 /// Sixteen paths between two vertices.
 #[derive(Clone)]
 pub struct Packet {
-    /// Where they go.
+    /// Rays of the current segments.
     pub rays: Rays,
-    /// f cos / pdf of everything before.
+    /// Throughput: product of f cos / pdf so far.
     pub throughput: Lanes3,
     /// Product of the relative indices of refraction.
     pub eta: Lanes,
-    /// Density of the last direction.
+    /// Density per solid angle of the last direction.
     pub pdf: Lanes,
-    /// Whether it was one of a smooth lobe.
+    /// Lanes whose last direction is one of a smooth lobe.
     pub smooth: Mask,
-    /// Where it was taken.
+    /// Point that the current segment leaves.
     pub from: Lanes3,
-    /// Numbers of their samples in the wave.
+    /// Indices of the samples in the wave.
     pub id: Bits,
-    /// What tells their random numbers apart.
+    /// Hashes of the paths' random numbers.
     pub hash: Bits,
-    /// Their places among the vertices before.
+    /// Indices of the vertices that the segments leave.
     pub parent: Bits,
 }
 
@@ -53,12 +53,12 @@ impl Paths {
         self.count
     }
 
-    /// Forgets all paths, but keeps their room.
+    /// Removes all paths but keeps their memory.
     pub fn clear(&mut self) {
         self.count = 0;
     }
 
-    /// Makes room for another path; returns where.
+    /// Appends a path; returns its packet and lane.
     #[inline(always)]
     pub fn push(&mut self) -> (&mut Packet, usize) {
         let (packet, lane) = (self.count / LANES, self.count % LANES);
@@ -69,7 +69,7 @@ impl Paths {
         (&mut self.packets[packet], lane)
     }
 
-    /// The packets, and which of their lanes hold a path.
+    /// All packets with the lanes that hold a path.
     pub fn packets(&self) -> impl Iterator<Item = (&Packet, Mask)> {
         let packets = &self.packets[..self.count.div_ceil(LANES)];
         packets.iter().enumerate().map(|(k, packet)| (packet, Mask::first(self.count - k * LANES)))

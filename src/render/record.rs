@@ -1,4 +1,4 @@
-//! The recorder: what the paths of a wave have contributed so far, and the vertices that they consist of.
+//! The record of a wave: contributions and features of its paths so far, and their vertices.
 
 use super::continuation::Shaded;
 use super::emission::{self, EmitterHit};

@@ -1,6 +1,6 @@
 //! Random numbers as a pure function of seed, pixel, sample and dimension.
 //!
-//! Samples are dealt to bins in turn. Within a bin every two dimensions follow the first two of Sobol's sequence,
+//! Sample i belongs to bin i mod 8. Within a bin every two dimensions follow the first two of Sobol's sequence,
 //! shuffled and scrambled after Owen by hashes (Burley 2020); pairs, pixels and bins are scrambled apart, so that
 //! differences between bins tell variance. Every bounce owns its dimensions, whatever happened before it.
 //!
@@ -11,7 +11,7 @@ use crate::film::BINS;
 use crate::math::lanes::{Bits, Lanes};
 use crate::math::{Vec2, rng, vec2};
 
-/// The place in the sequences of all samples of one number.
+/// Position of all samples with one index in their sequences.
 #[derive(Clone, Copy, Debug)]
 pub struct Sampler {
     seed: u64,
@@ -20,23 +20,23 @@ pub struct Sampler {
     reversed: u32,
 }
 
-/// The numbers of the vertex after some scattering events that choose its light.
+/// Random numbers of next-event estimation at a vertex.
 #[derive(Clone, Copy, Debug)]
 pub struct LightNumbers {
-    /// Chooses the emitter.
+    /// Selects the emitter.
     pub choice: Lanes,
-    /// Choose the point on it.
+    /// Select the point on it.
     pub point: [Lanes; 2],
 }
 
-/// The numbers of a vertex that choose where a path goes on.
+/// Random numbers of scattering at a vertex.
 #[derive(Clone, Copy, Debug)]
 pub struct ScatterNumbers {
-    /// Chooses the lobe.
+    /// Selects the lobe.
     pub lobe: Lanes,
-    /// Choose the direction.
+    /// Select the direction.
     pub direction: [Lanes; 2],
-    /// Decides on survival.
+    /// Decides on survival of Russian roulette.
     pub survival: Lanes,
 }
 
@@ -47,7 +47,7 @@ impl Sampler {
         Self { seed: rng::mix(seed), bin, reversed: (index / BINS as u32).reverse_bits() }
     }
 
-    /// What tells the numbers of pixel number `pixel` from others'.
+    /// Hash that keeps the numbers of pixel number `pixel` apart from those of other pixels.
     pub fn hash(&self, pixel: u64) -> u32 {
         fold(rng::combine(rng::combine(self.seed, pixel), self.bin))
     }
@@ -65,13 +65,13 @@ impl Sampler {
         self.pair(part(hashes, 0))
     }
 
-    /// Directions for ambient occlusion.
+    /// Random numbers of ambient occlusion's directions.
     #[inline(always)]
     pub fn occlusion(&self, hashes: Bits) -> [Lanes; 2] {
         self.pair(part(hashes, 1))
     }
 
-    /// The light of the vertex after `depth` scattering events.
+    /// Next-event estimation at the vertex after `depth` scattering events.
     #[inline(always)]
     pub fn light(&self, hashes: Bits, depth: u32) -> LightNumbers {
         let first = depth.wrapping_mul(4).wrapping_add(2);
@@ -79,7 +79,7 @@ impl Sampler {
         LightNumbers { choice, point: self.pair(part(hashes, first)) }
     }
 
-    /// The way on from that vertex.
+    /// Scattering at that vertex.
     #[inline(always)]
     pub fn scatter(&self, hashes: Bits, depth: u32) -> ScatterNumbers {
         let first = depth.wrapping_mul(4).wrapping_add(4);

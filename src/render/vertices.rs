@@ -1,4 +1,4 @@
-//! What paths meet and choose at a vertex.
+//! Vertices of sixteen paths: surface, next-event sample and scattered direction.
 
 use crate::math::lanes::{Bits, Lanes, Lanes3, Mask};
 use crate::scene::packet::{Evals, Lights, Materials, Scatters, Surfaces};
@@ -6,57 +6,57 @@ use crate::scene::packet::{Evals, Lights, Materials, Scatters, Surfaces};
 /// Sixteen vertices of as many paths.
 #[derive(Clone)]
 pub struct Vertices {
-    /// Which of the paths have hit a surface that they may scatter at.
+    /// Lanes that have hit a surface that they may scatter at.
     pub hit: Mask,
-    /// Numbers of the paths' samples in the wave.
+    /// Indices of the samples in the wave.
     pub id: Bits,
     /// The surfaces.
     pub surfaces: Surfaces,
-    /// Their materials.
+    /// Materials of the surfaces.
     pub materials: Materials,
-    /// f cos / pdf of everything before, with the chances of survival taken off.
+    /// Throughput up to the vertices: product of f cos / pdf, divided by the survival probabilities.
     pub throughput: Lanes3,
-    /// Which are lit by a visible point of an emitter that was chosen.
+    /// Lanes whose next-event sample is visible and non-zero.
     pub lit: Mask,
-    /// The points.
+    /// The next-event samples.
     pub light: Light,
-    /// Which are gone on from.
+    /// Lanes whose path continues.
     pub scattered: Mask,
-    /// The directions.
+    /// Sampled directions.
     pub scatters: Scatters,
-    /// Chances of having survived Russian roulette after them.
+    /// Survival probabilities of Russian roulette after the vertices.
     pub survival: Lanes,
-    /// Places of the paths at the next vertices.
+    /// Indices of the next vertices.
     pub next: Bits,
-    /// Which lead to an emitter.
+    /// Lanes whose next segment ends on an emitter.
     pub emits: Mask,
-    /// What is hit there.
+    /// Those emitters.
     pub emission: Emission,
 }
 
-/// Points on emitters chosen at vertices, seen from there.
+/// Emitter points sampled by next-event estimation.
 #[derive(Clone)]
 pub struct Light {
     /// The points.
     pub points: Lights,
-    /// Radiance they send.
+    /// Radiance that the points send to the vertices.
     pub radiance: Lanes3,
-    /// Local directions towards them.
+    /// Local directions towards the points.
     pub wo: Lanes3,
-    /// Scattering from them, and the densities of running into them.
+    /// BSDF values, and densities of hitting the points by scattering.
     pub evals: Evals,
-    /// Densities of choosing the points, per solid angle.
+    /// Densities per solid angle of sampling the points.
     pub pdf: Lanes,
 }
 
-/// Emitters that paths have run into by scattering.
+/// Emitters that paths have hit by scattering.
 #[derive(Clone)]
 pub struct Emission {
     /// The points that were hit.
     pub points: Lights,
-    /// Radiance they send back.
+    /// Radiance that the points send back.
     pub radiance: Lanes3,
-    /// Densities with which they would have been chosen; 0 after a delta lobe.
+    /// Densities with which next-event estimation would have sampled the points; 0 after a delta lobe.
     pub light_pdf: Lanes,
 }
 

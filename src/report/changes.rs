@@ -1,4 +1,4 @@
-//! What got better and what got worse between two sets of results.
+//! Improvements and regressions between two sets of results.
 
 use serde::Serialize;
 
@@ -17,7 +17,7 @@ pub struct Change {
     pub scene: String,
     /// The method with its parameters.
     pub method: String,
-    /// What was to be used up.
+    /// Budget, as `5s` or `64spp`.
     pub budget: String,
     /// Error now over error then, geometric mean over the seeds.
     pub ratio: f64,

@@ -22,7 +22,7 @@ const PLOTTED: [&str; 4] = ["relmse", "smape", "flip", "mse"];
 
 /// An image with its name.
 pub struct Shown {
-    /// What it is called.
+    /// Name of the scene.
     pub label: String,
     /// Linear radiance.
     pub image: Image,
@@ -32,20 +32,20 @@ pub struct Shown {
 pub struct View {
     /// Name of the scene.
     pub name: String,
-    /// What the images are judged by.
+    /// The reference image.
     pub reference: Image,
     /// The images.
     pub images: Vec<Shown>,
 }
 
-/// What is to be shown.
+/// Content of the page.
 #[derive(Default)]
 pub struct Page<'a> {
     /// The heading.
     pub title: String,
     /// Results for plots and tables.
     pub results: Option<&'a Results>,
-    /// What has changed since earlier results.
+    /// Changes since earlier results.
     pub changes: Vec<Change>,
     /// Images for the viewer.
     pub views: Vec<View>,

@@ -18,7 +18,7 @@ pub fn heat(map: &Image, top: Option<f32>) -> Image {
     })
 }
 
-/// What the worst hundredth of the values exceeds.
+/// The 99th percentile of the values.
 pub fn worst(map: &Image) -> f32 {
     let mut sorted = map.data.clone();
     sorted.sort_by(f32::total_cmp);

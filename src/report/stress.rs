@@ -11,11 +11,11 @@ use crate::stress::{Check, Checks};
 pub struct Row {
     /// Kind and name.
     pub name: &'static str,
-    /// What it is.
+    /// Description of the case.
     pub summary: &'static str,
     /// Wall-clock time.
     pub seconds: f64,
-    /// What was found.
+    /// Figures of the case.
     #[serde(flatten)]
     pub checks: Checks,
 }

@@ -16,7 +16,7 @@ pub struct Point {
     pub scene: String,
     /// The method with its parameters.
     pub method: String,
-    /// What was to be used up.
+    /// Budget, as `5s` or `64spp`.
     pub budget: String,
     /// Seconds that were, mean over the seeds.
     pub seconds: f64,
@@ -62,7 +62,7 @@ pub struct Row {
 pub struct Summary {
     /// Every method, that with the least error first.
     pub rows: Vec<Row>,
-    /// What they are made from.
+    /// The records that are summarised.
     pub points: Vec<Point>,
 }
 
@@ -169,7 +169,7 @@ fn median(mut values: Vec<f64>) -> Option<f64> {
     Some(0.5 * (low + high))
 }
 
-/// The exponential of the mean of what is finite; none of nothing.
+/// Geometric mean of the finite values; none if there are none.
 fn geometric_mean(logarithms: impl Iterator<Item = f64>) -> Option<f64> {
     let all: Vec<f64> = logarithms.filter(|value| value.is_finite()).collect();
     let mean = (all.iter().sum::<f64>() / all.len() as f64).exp();

@@ -88,7 +88,7 @@ impl Accel {
         self.scene.intersect_packet(&rays, coherent)
     }
 
-    /// Which of the active rays meet anything.
+    /// Active lanes whose ray hits anything.
     #[inline]
     pub fn occluded_packet(&self, rays: &Rays, active: Mask) -> Mask {
         let rays = rays.to_embree(active);
@@ -106,7 +106,7 @@ impl Accel {
         placement.surface(shapes, hit, ray)
     }
 
-    /// Whether the open segment between two points meets anything.
+    /// Whether the open segment between two points is occluded.
     #[inline]
     pub fn blocked(&self, from: Vec3, to: Vec3) -> bool {
         let (origin, direction) = (from.to_array(), (to - from).to_array());
@@ -122,7 +122,7 @@ impl Accel {
         self.log = Some(RayLog::default());
     }
 
-    /// Traces all rays kept again; returns their number, and that of those which met something.
+    /// Traces all logged rays again; returns their number and the number of hits.
     pub fn replay_rays(&self) -> (usize, usize) {
         self.log.as_ref().map_or((0, 0), |log| log.replay(&self.scene))
     }

@@ -1,11 +1,11 @@
-//! Every ray of a render as Embree was asked for it, to be asked for again and nothing else: what rendering cannot be
+//! Every ray query of a render, to be traced again on its own: the time that rendering cannot be
 //! faster than.
 
 use std::sync::Mutex;
 
 use crate::ffi::embree::{Committed, Ray, Rays};
 
-/// What was asked for.
+/// A logged query.
 enum Call {
     First(Ray),
     Any(Ray),
@@ -22,27 +22,27 @@ impl RayLog {
         self.0.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).push(call);
     }
 
-    /// A first hit was asked for.
+    /// First hit of a ray.
     pub fn first(&self, ray: Ray) {
         self.add(Call::First(ray));
     }
 
-    /// Any hit was asked for.
+    /// Any hit of a ray.
     pub fn any(&self, ray: Ray) {
         self.add(Call::Any(ray));
     }
 
-    /// First hits were asked for.
+    /// First hits of a packet.
     pub fn first_of_packet(&self, rays: Rays, coherent: bool) {
         self.add(Call::FirstOfPacket(rays, coherent));
     }
 
-    /// Any hits were asked for.
+    /// Any hits of a packet.
     pub fn any_of_packet(&self, rays: Rays) {
         self.add(Call::AnyOfPacket(rays));
     }
 
-    /// Asks for all again; returns the number of rays, and of those that met something.
+    /// Traces all rays again; returns their number and the number of hits.
     pub fn replay(&self, scene: &Committed) -> (usize, usize) {
         let calls = self.0.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
         let (mut rays, mut met) = (0, 0);

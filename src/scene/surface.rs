@@ -1,9 +1,9 @@
-//! A point where a ray meets a shape.
+//! The point where a ray hits a shape.
 
 use super::{Ray, texture};
 use crate::math::{Frame, Vec3};
 
-/// A surface point with its two normals and what textures need. Directions at a surface point away from it.
+/// A surface point with its two normals and texture coordinates. Directions at a surface point away from it.
 #[derive(Clone, Copy, Debug)]
 pub struct Surface {
     /// Position.
@@ -12,7 +12,7 @@ pub struct Surface {
     pub n: Vec3,
     /// Shading frame.
     pub frame: Frame,
-    /// Where textures are looked up.
+    /// Texture coordinates.
     pub at: texture::Point,
     /// Change of position along u. Zero unless the material asked for it.
     pub dp_du: Vec3,
@@ -42,7 +42,7 @@ pub fn offset(p: Vec3, n: Vec3, epsilon: f32, direction: Vec3) -> Vec3 {
 }
 
 impl Surface {
-    /// Where rays along `direction` start.
+    /// Origin of rays that leave along `direction`.
     #[inline]
     pub fn leave(&self, direction: Vec3) -> Vec3 {
         offset(self.p, self.n, self.epsilon, direction)

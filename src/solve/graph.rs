@@ -22,7 +22,7 @@ pub const ALONE: u32 = u32::MAX;
 
 /// A symmetric matrix: on the diagonal the screening weight and the edge weights, beside it minus the edge weights.
 pub struct Graph {
-    /// Where each node's edges begin in `edges`, and the end of the last.
+    /// Start of each node's entries in `edges`, and the end of the last.
     first: Vec<u32>,
     /// Other end and weight.
     edges: Vec<(u32, f32)>,

@@ -41,7 +41,7 @@ pub struct Multigrid {
     factor: Option<Vec<f64>>,
 }
 
-/// What [`Multigrid::solve`] found.
+/// Result of [`Multigrid::solve`].
 pub struct Solved {
     /// The solutions.
     pub x: Vec<Quad>,

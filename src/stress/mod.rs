@@ -16,21 +16,21 @@ use serde::Serialize;
 
 use crate::error::Result;
 
-/// A thing that is hard.
+/// A hard problem with a known answer.
 pub struct Case {
     /// Kind and name, as in `frames/firefly`.
     pub name: &'static str,
-    /// What it is.
+    /// Description of the case.
     pub summary: &'static str,
     run: fn(&mut Checks) -> Result<()>,
 }
 
-/// A figure and its bound.
+/// A measured figure and its bound.
 #[derive(Clone, Debug, Serialize)]
 pub struct Check {
-    /// Who was tried: a method, a solver, a shift.
+    /// Subject of the figure: a method, a solver, a shift.
     pub subject: String,
-    /// What was measured, small being good.
+    /// The measured quantity; small values are good.
     pub measure: &'static str,
     /// The figure.
     pub value: f64,
@@ -45,12 +45,12 @@ impl Check {
     }
 }
 
-/// What a case found.
+/// Figures of a case.
 #[derive(Debug, Default, Serialize)]
 pub struct Checks {
     /// In the order in which they were made.
     pub list: Vec<Check>,
-    /// Why the case could not be run to its end.
+    /// Error that ended the case early.
     pub failed: Option<String>,
 }
 

@@ -123,7 +123,10 @@ fn with_the_same_variance_everywhere_the_feature_is_the_plain_poisson_solution()
     }
     let feature = run("feature:prefilter=off", &frame).image;
     let poisson = run("l2:alpha=1", &frame).image;
-    let worst = feature.data.iter().zip(&poisson.data).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+    // Averages of variances are lower near the border, beyond which there are no edges.
+    let inside = |i: &usize| (8..WIDTH - 8).contains(&(i / 3 % WIDTH)) && (8..HEIGHT - 8).contains(&(i / 3 / WIDTH));
+    let differences = (0..feature.data.len()).filter(inside).map(|i| (feature.data[i] - poisson.data[i]).abs());
+    let worst = differences.fold(0.0, f32::max);
     assert!(worst < 2e-3, "{worst}");
 }
 

@@ -57,22 +57,25 @@ const FFI_USERS: &[&str] = &[
     "src/scene/shape/cylinder.rs",
 ];
 
-fn files(folder: &Path, found: &mut Vec<PathBuf>) {
+/// Files with an extension in a folder and those below it.
+pub fn files_below(folder: &Path, extension: &str) -> Vec<PathBuf> {
+    let mut found = Vec::new();
     for entry in fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
         if path.is_dir() {
-            files(&path, found);
-        } else if path.extension().is_some_and(|extension| extension == "rs") {
+            found.extend(files_below(&path, extension));
+        } else if path.extension().is_some_and(|other| other == extension) {
             found.push(path);
         }
     }
+    found
 }
 
-fn sources() -> Vec<(String, String)> {
+/// Names and texts of all source files.
+pub fn sources() -> Vec<(String, String)> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let mut found = Vec::new();
-    files(&root.join("src"), &mut found);
     let name = |path: &Path| path.strip_prefix(root).unwrap().display().to_string();
+    let found = files_below(&root.join("src"), "rs");
     found.iter().map(|path| (name(path), fs::read_to_string(path).unwrap())).collect()
 }
 

@@ -105,7 +105,7 @@ fn a_time_budget_is_kept_roughly_and_a_replayed_sample_is_printed() {
     assert!(start.elapsed().as_secs_f64() > 0.4);
     let output =
         fluxion(folder.path()).args(["render", &scene("cornell-box"), "--replay", "100,100,3"]).output().unwrap();
-    assert!(String::from_utf8_lossy(&output.stdout).contains("edges"));
+    assert!(String::from_utf8_lossy(&output.stdout).contains("differences"));
 }
 
 #[test]

@@ -22,7 +22,8 @@ fn every_layer_survives_a_file_bit_for_bit() {
     frame.provenance.seed = "3".into();
     layers::save(&path, &frame).unwrap();
     let back = layers::load(&path).unwrap();
-    assert_eq!(back.present().count(), Layer::COUNT);
+    // Edges were sampled as often as colours.
+    assert_eq!(back.present().count(), Layer::COUNT - 1);
     assert!(back == frame);
 }
 
@@ -117,5 +118,5 @@ fn what_nobody_needs_is_not_recorded() {
     for layer in [Layer::Occlusion, Layer::Position, Layer::BinAmbient(0), Layer::BinAmbientDx(3)] {
         assert!(frame.get(layer).is_none(), "{}", layer.name());
     }
-    assert!(film(&scene, 4, 1, Needs::ALL).develop().present().count() == Layer::COUNT);
+    assert!(film(&scene, 4, 1, Needs::ALL).develop().present().count() == Layer::COUNT - 1);
 }

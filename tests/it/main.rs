@@ -19,3 +19,4 @@ mod methods;
 mod oidn;
 mod report;
 mod stress;
+mod vocabulary;

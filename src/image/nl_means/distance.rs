@@ -13,7 +13,7 @@ pub struct Guide {
     pub tolerance: Option<Planes>,
 }
 
-/// What a pixel is compared with.
+/// A guide image in the form that distances are computed from.
 #[derive(Clone, Copy)]
 pub enum Other {
     /// The pixel at an offset.
@@ -23,8 +23,8 @@ pub enum Other {
 }
 
 impl Guide {
-    /// Squared difference between pixels of [`LANES`] columns and others beyond what noise explains, over `k2` times
-    /// what is tolerated (Rousselle et al. 2013, eq. 4, with sums over the channels).
+    /// Squared difference between pixels of [`LANES`] columns and others, less the part that noise explains, over `k2`
+    /// times the tolerated difference (Rousselle et al. 2013, eq. 4, with sums over the channels).
     #[inline(always)]
     pub fn distance(&self, (x, y): (isize, isize), other: Other, k2: f32) -> Lanes {
         let load = |planes: &Planes, c: usize, dx: isize, dy: isize| planes.lanes(c, x + dx, y + dy);
@@ -60,7 +60,7 @@ pub struct Patches {
     tile: Tile,
     reach: usize,
     distance: Vec<f32>,
-    /// Sums along rows for each radius asked for.
+    /// Sums along rows for each radius.
     rows: Vec<Vec<f32>>,
 }
 
@@ -94,7 +94,7 @@ impl Patches {
         }
     }
 
-    /// Means over the patches around [`LANES`] pixels of the tile, of the radius asked for at place `which`.
+    /// Means over the patches around [`LANES`] pixels of the tile, of the radius at position `which` of those asked for.
     #[inline(always)]
     pub fn mean(&self, which: usize, radius: usize, x: usize, y: usize) -> Lanes {
         let width = self.tile.width.next_multiple_of(LANES);

@@ -9,7 +9,7 @@ use self::distance::{Other, Patches};
 use super::planes::{Planes, Tile};
 use crate::math::lanes::{LANES, Lanes};
 
-/// What pixels are compared by: colours over patches, and features, of which the least alike decides.
+/// Guides that pixels are compared by: colours over patches, and features, of which the largest distance counts.
 pub struct Guides {
     /// The colour.
     pub color: Guide,

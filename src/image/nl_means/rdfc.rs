@@ -6,12 +6,12 @@ use super::{Guide, Guides, Settings, filter, offsets};
 use crate::image::planes::{Planes, Tile};
 use crate::math::lanes::{LANES, Lanes};
 
-/// What the three filters compare colours by: two sizes of patch, and not at all.
+/// Colour distances of the three filters: two patch sizes, and no colours at all.
 const PATCHES: [usize; 2] = [1, 3];
 const COLOR_TOLERANCE: f32 = 0.45;
 const FEATURE_TOLERANCE: f32 = 0.6;
 
-/// Which variant of the method.
+/// Parameters of the method.
 #[derive(Clone, Copy, Debug)]
 pub struct Options {
     /// Radius of the window.
@@ -36,7 +36,7 @@ pub struct Denoised {
 /// Rows that smoothing the errors and the choice between the filters looks beyond a band.
 const OVERLAP: usize = 4;
 
-/// Denoises a colour image; `progress` is told the finished share.
+/// Denoises a colour image; `progress` is called with the finished share.
 pub fn denoise(guides: &Guides, options: Options, progress: &dyn Fn(f32)) -> Denoised {
     let (width, height) = (guides.color.mean.width, guides.color.mean.height);
     if options.rows >= height {
@@ -90,26 +90,27 @@ fn denoise_band(guides: &Guides, options: Options) -> Denoised {
 struct Sums {
     weight: Lanes,
     largest: Lanes,
-    /// Of differences to the centre.
+    /// Weighted mean of the differences to the centre.
     color: [Lanes; 3],
-    /// What the weights' own dependence on the centre's colour adds to the slope of the result.
-    bend: Lanes,
-    lean: [Lanes; 3],
+    /// Contribution of the weights' dependence on the centre's colour to the derivative of the result.
+    weight_derivative: Lanes,
+    /// Differences to the centre, weighted by the part of the weights that depends on the centre's colour.
+    weighted_steps: [Lanes; 3],
 }
 
 const EMPTY: Sums = Sums {
     weight: Lanes::ZERO,
     largest: Lanes::ZERO,
     color: [Lanes::ZERO; 3],
-    bend: Lanes::ZERO,
-    lean: [Lanes::ZERO; 3],
+    weight_derivative: Lanes::ZERO,
+    weighted_steps: [Lanes::ZERO; 3],
 };
 
 /// A pixel of the window, seen from the centre.
 struct Neighbour {
     step: [Lanes; 3],
     square: Lanes,
-    /// What distances are divided by.
+    /// Normalisation of the distances.
     noise: Lanes,
 }
 
@@ -136,10 +137,10 @@ impl Sums {
         self.weight += weight;
         self.largest = self.largest.max(weight);
         let follows = follows / pixel.noise;
-        self.bend += follows * pixel.square;
+        self.weight_derivative += follows * pixel.square;
         for c in 0..3 {
             self.color[c] += weight * pixel.step[c];
-            self.lean[c] += follows * pixel.step[c];
+            self.weighted_steps[c] += follows * pixel.step[c];
         }
     }
 }
@@ -225,16 +226,16 @@ fn finish(guides: &Guides, tile: Tile, sums: &[[Sums; 3]]) -> Vec<f32> {
             let side = 2 * PATCHES[k.min(1)] + 1;
             let centre = sums.largest.max(Lanes::splat(1e-3));
             let total = sums.weight + centre;
-            let (mut error, mut bend) = (Lanes::ZERO - noise, sums.bend);
+            let (mut error, mut weight_derivative) = (Lanes::ZERO - noise, sums.weight_derivative);
             for c in 0..3 {
                 let step = sums.color[c] / total;
                 tile.put(&mut out, 3 * k + c, x, y, load(&color.mean, c) + step);
                 error += step * step;
-                bend = bend - step * sums.lean[c];
+                weight_derivative = weight_derivative - step * sums.weighted_steps[c];
             }
             // dF/du, mean over the channels; outside [0, 1] it is not believed.
             let direct = centre / total;
-            let follows = Lanes::splat(2.0 / (3 * side * side) as f32) * noise * bend / total;
+            let follows = Lanes::splat(2.0 / (3 * side * side) as f32) * noise * weight_derivative / total;
             let slope = direct + if k < 2 { follows } else { Lanes::ZERO };
             let slope = direct.where_greater(Lanes::ZERO, slope, direct.where_greater(slope, Lanes::splat(1.0), slope));
             tile.put(&mut out, 9 + k, x, y, Lanes::splat(1.0 / 3.0) * (error + Lanes::splat(2.0) * noise * slope));

@@ -37,7 +37,7 @@ impl Bits {
         Self(out)
     }
 
-    /// Where they equal a value.
+    /// Mask of the lanes that equal a value.
     #[inline(always)]
     pub fn equal(self, value: u32) -> Mask {
         Mask(self.map(|lane| if lane == value { !0 } else { 0 }).0)

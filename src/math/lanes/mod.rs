@@ -1,5 +1,5 @@
-//! Sixteen floats that are worked on together. Written so that compilers turn every operation into vector
-//! instructions of whatever width the function around it is compiled for; the bits are the same for all of them.
+//! Sixteen floats as a vector, in plain Rust that compilers turn into vector instructions of whatever width the enclosing
+//! function is compiled for; the bits are the same for all widths.
 
 mod bits;
 mod vector;
@@ -38,7 +38,7 @@ impl Lanes {
         Self(lanes)
     }
 
-    /// Writes to the first [`LANES`] places of a slice.
+    /// Writes to the first [`LANES`] values of a slice.
     #[inline(always)]
     pub fn store(self, to: &mut [f32]) {
         to[..LANES].copy_from_slice(&self.0);
@@ -62,7 +62,7 @@ impl Lanes {
         Self(out)
     }
 
-    /// Where these are smaller than others.
+    /// Mask of the lanes that are smaller than the other's.
     #[inline(always)]
     pub fn less(self, other: Self) -> Mask {
         let mut out = [0; LANES];
@@ -72,7 +72,7 @@ impl Lanes {
         Mask(out)
     }
 
-    /// Where these are larger than others.
+    /// Mask of the lanes that are larger than the other's.
     #[inline(always)]
     pub fn greater(self, other: Self) -> Mask {
         other.less(self)
@@ -84,7 +84,7 @@ impl Lanes {
         self.map(f32::abs)
     }
 
-    /// The absolute values with the signs of others.
+    /// The absolute values with the other's signs.
     #[inline(always)]
     pub fn copysign(self, sign: Self) -> Self {
         self.zip(sign, f32::copysign)
@@ -211,7 +211,7 @@ where
     (cosine, sine)
 }
 
-/// Which lanes something holds for: all bits of a lane or none.
+/// A set of lanes: all bits of a lane are set or none.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(align(64))]
 pub struct Mask(pub [u32; LANES]);

@@ -80,7 +80,7 @@ impl Lanes3 {
         Self { x: self.x.abs(), y: self.y.abs(), z: self.z.abs() }
     }
 
-    /// Where a coordinate is not zero.
+    /// Mask of the lanes with a coordinate other than zero.
     #[inline(always)]
     pub fn nonzero(self) -> Mask {
         self.abs().max_element().greater(Lanes::ZERO)

@@ -1,4 +1,4 @@
-//! What colours are fitted by: the constant, the features, and monomials of the position up to an order. Each order's
+//! Columns of the regression: the constant, the features, and monomials of the position up to an order. Each order's
 //! columns follow those of the one before, so that one factorisation serves all of them.
 
 use super::blocks::coordinates;

@@ -12,7 +12,7 @@ pub struct Fit {
     pub slopes: Vec<[f32; 3]>,
 }
 
-/// Mean square that a feature's slope counts as if it were seen with, without the colour having changed: what varies by
+/// Ridge of a feature's slope, as a mean square that is added to the feature's: what varies by
 /// a hundredth of its range or less explains nothing.
 const RIDGE: f64 = 1e-4;
 

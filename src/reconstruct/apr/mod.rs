@@ -1,6 +1,6 @@
 //! Adaptive polynomial rendering (after Moon et al. 2016): colours are fitted in square windows by polynomials of the
 //! position, whose order adapts to the image, and linearly by features, of which one may be generated from gradients
-//! (Back et al. 2018). Every window predicts the blocks around its centre; what it says counts by its estimated error.
+//! (Back et al. 2018). Every window predicts the blocks around its centre, weighted by its estimated error.
 //! The pixel itself stays a candidate, so that the result is consistent.
 
 mod blocks;
@@ -65,7 +65,7 @@ const BYTES: u64 = 1200;
 /// Radius that variances are averaged over: those of single pixels follow the colours they are to weigh.
 const SMOOTHING: usize = 3;
 
-/// What variances are raised by, in units of the typical luminance squared.
+/// Constant that is added to variances, in squares of the typical luminance.
 const LEAST: f32 = 1e-4;
 
 /// A feature by its name, with the layers that hold it and its variance.
@@ -168,7 +168,7 @@ impl Reconstruction for Apr {
     }
 }
 
-/// What colours are linear in.
+/// Features that the colour is a linear function of.
 #[derive(Default)]
 struct Features {
     planes: Option<Planes>,
@@ -181,7 +181,7 @@ impl Apr {
     fn features(&self, inputs: &Inputs, progress: &dyn Fn(f32)) -> Result<Features> {
         let mut features = Features::default();
         if self.generated.is_some() {
-            // What a flag of its own renders is asked for first.
+            // The error names the differences first, which have a flag of their own.
             inputs.frame.require(Layer::Dx)?;
         }
         let mut add = |planes: Planes| {

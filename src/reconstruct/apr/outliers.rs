@@ -1,4 +1,5 @@
-//! Pixels far brighter than those around them, whose energy is spread over these: regression would follow them.
+//! Outliers: the energy of pixels far brighter than their neighbours is spread over these, since regression would follow
+//! them.
 
 use crate::image::planes::Planes;
 
@@ -8,7 +9,7 @@ const RADIUS: isize = 3;
 /// Pixels in it.
 const PIXELS: usize = ((2 * RADIUS + 1) * (2 * RADIUS + 1)) as usize;
 
-/// Clamps luminances to the median around them plus `limit` times the median distance from it; what is taken off is
+/// Clamps luminances to the median around them plus `limit` times the median distance from it; the excess is
 /// added to the pixels around in equal parts, so that the image's sum stays the same.
 pub fn spread(color: &Planes, limit: f32) -> Planes {
     let (width, height) = (color.width, color.height);

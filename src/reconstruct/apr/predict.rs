@@ -1,4 +1,4 @@
-//! What the windows around a block say about it: the mean of their fits of all orders, each weighted by its estimated
+//! Prediction of a block by the windows around it: the mean of their fits of all orders, each weighted by its estimated
 //! error there.
 
 use super::blocks::{Blocks, centre};
@@ -7,24 +7,24 @@ use super::fit::{Fit, entry};
 use super::windows::Problem;
 use crate::math::lanes::Lanes;
 
-/// Blocks to each side whose windows are asked.
+/// Radius, in blocks, of the windows' centres that predict a block.
 const REACH: usize = 2;
 
 /// Blocks at which a window counts 1/e of the block's own.
 const SPREAD: f32 = 2.0;
 
-/// What errors are raised by, in units of the pixel's variance, so that none decides alone.
+/// Constant that is added to errors, in units of the pixel's variance, so that no fit decides alone.
 const LEAST: f32 = 2e-3;
 
 /// Channels of a prediction: colour, and how much of it is the pixel's own.
 pub const CHANNELS: usize = 4;
 
-/// Where [`CHANNELS`] hold the share that a pixel has in its own prediction.
+/// Channel of [`CHANNELS`] that holds the leverage: the weight of a pixel's own colour in its prediction.
 pub const LEVERAGE: usize = 3;
 
 /// Fits to choose from.
 pub struct Candidates<'a> {
-    /// What was fitted.
+    /// The regression problem.
     pub problem: &'a Problem<'a>,
     /// Fits of the windows of every block, for windows of different sizes.
     pub fits: &'a [Vec<Fit>],
@@ -79,7 +79,7 @@ fn block(candidates: &Candidates, pilot: Option<&Blocks>, (x, y): (usize, usize)
                         let off = fitted[c] - target[c];
                         square += off * off;
                     }
-                    // In units of the variance, which weights are one over: what fits vary by is their leverage.
+                    // In units of the variance, which is the inverse of the weight: the variance of a fit is its leverage.
                     let leverage = weight * leverage;
                     let (off, variance) = ((weight * square).sum() / pixels, leverage.sum() / pixels);
                     let error = match pilot {

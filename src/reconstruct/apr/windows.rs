@@ -11,9 +11,9 @@ use crate::math::lanes::Lanes;
 /// Blocks in a row of a tile, whose windows are fitted together.
 const TILE: usize = 16;
 
-/// What is fitted, and by what.
+/// A regression problem: colours, features and weights of all blocks.
 pub struct Problem<'a> {
-    /// What the colour is a linear function of, besides the position.
+    /// Features that the colour is a linear function of, besides the position.
     pub features: &'a Blocks,
     /// Three channels.
     pub color: &'a Blocks,

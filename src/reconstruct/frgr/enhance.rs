@@ -33,7 +33,7 @@ const LEAST_VARIANCE: f32 = 1e-6;
 /// Residuals are brought down to this share. What is left is well below the noise of the data.
 const TOLERANCE: f64 = 0.04;
 
-/// An enhanced image with what is known of its error.
+/// An enhanced image and its estimated error.
 pub struct Enhanced {
     /// Its differences are the enhanced gradients.
     pub image: Planes,

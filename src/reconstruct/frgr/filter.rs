@@ -19,15 +19,15 @@ pub const TERMS: usize = RANK / 3;
 
 /// Something of three channels that the weighted mean should hit.
 pub struct Term<'a> {
-    /// What is averaged.
+    /// Values that are averaged.
     pub value: Cow<'a, Planes>,
-    /// What the mean should be, at the centre.
+    /// Value at the centre that the mean should have.
     pub target: &'a Planes,
     /// How much that counts.
     pub weight: f32,
 }
 
-/// What minimises the objective.
+/// Solver of the objective.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Solver {
     /// Three sweeps of exact line searches towards each pixel in turn, as the authors have it. Stopping early keeps
@@ -51,7 +51,7 @@ impl std::str::FromStr for Solver {
 
 /// A filter's inputs.
 pub struct Problem<'a> {
-    /// What is filtered.
+    /// The sampled colour.
     pub color: &'a Planes,
     /// Its variance.
     pub variance: &'a Planes,

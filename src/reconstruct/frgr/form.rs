@@ -1,11 +1,11 @@
 //! The three forms of the method: as published, as its authors' program has it, and as measures best here.
 
-/// Which one.
+/// A form of the method.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Form {
     /// Yan et al. 2024, as printed.
     Paper,
-    /// What their program does where it differs.
+    /// As the authors' program, where it differs from the paper.
     Code,
     /// Weights by the noise that is left, so that the error keeps falling as samples are added.
     Best,

@@ -1,4 +1,4 @@
-//! What is known of an image at one resolution.
+//! An image at one resolution: colour, differences, features and their variances.
 
 use crate::image::planes::Planes;
 use crate::reconstruct::features::Feature;
@@ -10,15 +10,15 @@ pub struct Level {
     pub color: Planes,
     /// Variance of the colour.
     pub variance: Planes,
-    /// Differences to the right and downwards. Those of the last column and row belong to no edge.
+    /// Differences to the right and downwards. The values of the last column and row belong to no edge.
     pub gradients: [Planes; 2],
-    /// Their variances, mean over the channels.
+    /// Variances of the differences, mean over the channels.
     pub noise: [Planes; 2],
-    /// Albedo and normal, as far as they are there and asked for.
+    /// Albedo and normal, if the frame has them and they are asked for.
     pub features: Vec<Feature>,
 }
 
-/// Share of the mean variance around it that a difference's variance is raised to.
+/// Least variance of a difference, as a share of the mean variance of those around it.
 const GRADIENT_FLOOR: f32 = 0.25;
 
 impl Level {

@@ -306,7 +306,7 @@ struct Notes {
 impl Notes {
     fn add(&mut self, name: &str, planes: &Planes, scale: f32) {
         if self.wanted {
-            // Coarse levels keep what they were grown by to have even sides.
+            // Coarse levels keep the padding that makes their sides even.
             let (width, height) = (planes.width.min(self.size.0), planes.height.min(self.size.1));
             self.notes.push(Note { name: name.to_owned(), image: planes.to_image(width, height, 1.0 / scale) });
         }

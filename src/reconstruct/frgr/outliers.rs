@@ -1,4 +1,4 @@
-//! Differences that stand out from those around them.
+//! Removal of outliers among the differences, by those around them.
 
 use rayon::prelude::*;
 
@@ -45,7 +45,7 @@ struct Field<'a> {
     noise_test: bool,
 }
 
-/// What an outlier becomes.
+/// Replacement of an outlier.
 struct Replacement {
     median: [f32; 3],
     /// Squared standard deviation of the differences around it.
@@ -53,7 +53,7 @@ struct Replacement {
 }
 
 impl Field<'_> {
-    /// What a difference is to be replaced by, if it is an outlier.
+    /// Replacement of a difference, if it is an outlier.
     fn replacement(&self, x: usize, y: usize) -> Option<Replacement> {
         let [columns, rows] = self.edges;
         if x >= columns || y >= rows {

@@ -40,7 +40,8 @@ impl Stencil {
         self.across.iter_mut().zip(&other.across).for_each(|(sum, value)| *sum += weight * value);
     }
 
-    /// From the left cell to the right one, given what stands for each: 0 for the mean, 1 to 4 for one pixel.
+    /// Difference from the left cell to the right one, given the representative of each: 0 for the mean, 1 to 4 for one
+    /// pixel.
     fn of(left: u8, right: u8) -> Self {
         let pixel = |flag: u8| ((flag as usize - 1) % 2, (flag as usize - 1) / 2);
         let mut sum = Self::default();

@@ -15,7 +15,7 @@ const TOLERANCE: f32 = 0.3;
 pub struct Resampling {
     /// For each coarse pixel: 0 for the mean of its four fine ones, or 1 to 4 for one of them, row by row.
     flags: Vec<u8>,
-    /// For each fine pixel what it is a mixture of; empty for bilinear interpolation.
+    /// Coarse pixels that each fine pixel is a mixture of; empty for bilinear interpolation.
     pairs: Vec<Pair>,
     /// Size of the coarse image.
     width: usize,
@@ -148,7 +148,7 @@ impl Resampling {
         })
     }
 
-    /// What stands for a coarse pixel: 0 for the mean, 1 to 4 for one fine pixel.
+    /// Representative of every coarse pixel: 0 for the mean, 1 to 4 for one of its fine pixels.
     pub fn flag(&self, x: usize, y: usize) -> u8 {
         self.flags[y * self.width + x]
     }
@@ -166,7 +166,7 @@ fn fit_row(guide: &Planes, coarse: &Planes, y: usize) -> Fit {
         let mut near = [[Lanes::ZERO; CHANNELS]; 9];
         let mut away = [Lanes::ZERO; 9];
         for c in 0..channels {
-            let row = guide.from(c, (2 * x0 + odd) as isize, y as isize);
+            let row = guide.tail_from(c, (2 * x0 + odd) as isize, y as isize);
             target[c] = Lanes(std::array::from_fn(|l| row[2 * l]));
             for k in 0..9 {
                 let (x, y) = around(k, x0, y / 2);

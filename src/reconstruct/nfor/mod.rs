@@ -1,8 +1,8 @@
 //! NFOR, nonlinearly weighted first-order regression (Bitterli et al. 2016): colours are fitted by features in windows
 //! whose pixels count by how alike they are. Two halves of the samples, each weighted by the other, tell the error of
-//! two strengths of filtering; each pixel takes the better one, and a second pass removes what noise is left.
+//! two strengths of filtering; each pixel takes the better one, and a second pass removes the noise that is left.
 //!
-//! It needs no gradients: plain path tracing.
+//! The method needs no gradients: plain path tracing.
 
 mod regression;
 

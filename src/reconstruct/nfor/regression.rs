@@ -21,7 +21,7 @@ pub const WINDOW: usize = 9;
 const PATCH: usize = 3;
 const OFFSETS: usize = (2 * WINDOW + 1) * (2 * WINDOW + 1);
 
-/// Mean square that a column's slope counts as if it were seen with, without the colour having changed: what varies by
+/// Ridge of a column's slope, as a mean square that is added to the column's: what varies by
 /// a three-hundredth of its range or less explains nothing.
 const RIDGE: f32 = 1e-5;
 
@@ -68,7 +68,7 @@ fn add(sums: &mut [f32], (width, height): (usize, usize), fits: &[f32], tile: Ti
     }
 }
 
-/// What the columns are at [`LANES`] pixels, seen from others.
+/// Columns of the regression at [`LANES`] pixels, relative to the windows' centres.
 #[inline(always)]
 fn columns(features: &Planes, centre: &[Lanes; FEATURES], q: (isize, isize), step: (isize, isize)) -> [Lanes; COLUMNS] {
     let scaled = |step: isize| Lanes::splat(step as f32 / WINDOW as f32);
@@ -81,7 +81,7 @@ fn columns(features: &Planes, centre: &[Lanes; FEATURES], q: (isize, isize), ste
     columns
 }
 
-/// Weighted sums of the fitted colours and of the weights, with what falls around the tile.
+/// Weighted sums of the fitted colours and of the weights, over a tile and the windows' margin around it.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
 fn fit_tile(color: &Planes, features: &Planes, weights: &[f32], tile: Tile) -> Vec<f32> {
     let r = WINDOW as isize;

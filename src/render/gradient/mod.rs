@@ -1,4 +1,4 @@
-//! Shift mappings: how the path of a pixel becomes a path of its neighbour, and what the two differ by. The README beside
+//! Shift mappings: maps from the paths of a pixel to paths of its neighbours, and the differences of their contributions. The README beside
 //! this file derives the estimator.
 
 pub mod reconnect;

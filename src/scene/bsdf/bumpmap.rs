@@ -1,9 +1,9 @@
-//! Shading normals bent by a height texture (Blinn 1978).
+//! Shading normals perturbed by a height texture (Blinn 1978).
 
 use std::sync::Arc;
 
 use super::Bsdf;
-use super::bent::{Bend, Bent};
+use super::perturbed::{NormalMap, Perturbed};
 use crate::error::Result;
 use crate::math::Vec3;
 use crate::scene::Surface;
@@ -21,7 +21,7 @@ pub const PLUGIN: Plugin<Arc<dyn Bsdf>> = Plugin {
 
 fn make(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Bsdf>> {
     let bumps = Bumps { height: loader.nested_texture(object)?, scale: object.float("scale", 1.0)? };
-    Ok(Arc::new(Bent::load(object, loader, bumps)?))
+    Ok(Arc::new(Perturbed::load(object, loader, bumps)?))
 }
 
 struct Bumps {
@@ -29,13 +29,13 @@ struct Bumps {
     scale: f32,
 }
 
-impl Bend for Bumps {
+impl NormalMap for Bumps {
     fn normal(&self, surface: &Surface) -> Vec3 {
         let slope = self.height.gradient(&surface.at) * self.scale;
         let n = surface.frame.n;
         let du = surface.dp_du + n * (slope.x - n.dot(surface.dp_du));
         let dv = surface.dp_dv + n * (slope.y - n.dot(surface.dp_dv));
-        let bent = du.cross(dv).normalize_or(n);
-        surface.frame.to_local(bent * 1f32.copysign(surface.n.dot(bent)))
+        let perturbed = du.cross(dv).normalize_or(n);
+        surface.frame.to_local(perturbed * 1f32.copysign(surface.n.dot(perturbed)))
     }
 }

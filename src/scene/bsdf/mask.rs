@@ -10,7 +10,7 @@ use crate::scene::load::props::Object;
 use crate::scene::load::{Loader, Plugin};
 use crate::scene::texture::Texture;
 
-/// `mask`. Shadow rays do not see through: what lies behind is found by the paths that go through.
+/// `mask`. Shadow rays do not pass it: emitters behind it are hit by the paths that do.
 pub const PLUGIN: Plugin<Arc<dyn Bsdf>> = Plugin { name: "mask", parameters: "opacity = 0.5, one nested bsdf", make };
 
 fn make(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Bsdf>> {
@@ -38,7 +38,7 @@ impl Bsdf for Mask {
                 return Some(BsdfSample { pdf: sample.pdf * opacity, ..sample });
             }
         }
-        // Through a hole or through what is nested: one and the same way.
+        // Through a hole or through the nested material: the same direction.
         let Delta { wo, value, probability } = self.delta(surface, wi, Lobe::Null)?;
         Some(BsdfSample { wo, weight: value / probability, pdf: probability, lobe: Lobe::Null, eta: 1.0 })
     }

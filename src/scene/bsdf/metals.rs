@@ -80,7 +80,7 @@ const METALS: &[(&str, [f32; 3], [f32; 3])] = &[
     ("W", [4.37082, 3.30025, 2.99841], [3.50064, 2.60487, 2.27323]),
 ];
 
-/// Where the perfect mirror stands in [`names`].
+/// Index of the perfect mirror in [`names`].
 pub const NONE: usize = 0;
 
 /// All names.

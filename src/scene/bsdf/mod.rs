@@ -1,7 +1,6 @@
 //! Materials. Directions are local (the shading normal is +z) and point away from the surface; `wi` is where the
 //! path came from, `wo` where it goes.
 
-mod bent;
 mod blendbsdf;
 mod bumpmap;
 mod conductor;
@@ -12,6 +11,7 @@ mod metals;
 pub mod microfacet;
 mod normalmap;
 mod null;
+mod perturbed;
 mod plastic;
 mod principled;
 mod roughconductor;
@@ -54,7 +54,7 @@ pub fn default() -> Arc<dyn Bsdf> {
     diffuse::grey()
 }
 
-/// The kinds of scattering that are told apart when a path is replayed elsewhere.
+/// Kinds of scattering that shift mappings distinguish.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Lobe {
     /// Spread over solid angle.
@@ -98,7 +98,7 @@ pub struct Eval {
     pub pdf: f32,
 }
 
-/// What a delta lobe does with a direction.
+/// Scattering by a delta lobe.
 #[derive(Clone, Copy, Debug)]
 pub struct Delta {
     /// Its one outgoing direction.
@@ -125,7 +125,7 @@ pub trait Bsdf: Send + Sync {
     /// The smooth lobes.
     fn eval(&self, surface: &Surface, wi: Vec3, wo: Vec3) -> Eval;
 
-    /// What a delta lobe does; `None` when it is absent or cannot happen.
+    /// Scattering by a delta lobe; `None` if the material has none, or if it does not scatter `wi`.
     fn delta(&self, _surface: &Surface, _wi: Vec3, _lobe: Lobe) -> Option<Delta> {
         None
     }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::Bsdf;
-use super::bent::{Bend, Bent};
+use super::perturbed::{NormalMap, Perturbed};
 use crate::error::Result;
 use crate::math::{Rgb, Vec3, vec3};
 use crate::scene::Surface;
@@ -23,12 +23,12 @@ fn make(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Bsdf>> {
         return Err(object.loc.invalid("`normalmap` needs a texture `normalmap`"));
     }
     let normals = Normals(loader.texture(object, "normalmap", vec3(0.5, 0.5, 1.0))?);
-    Ok(Arc::new(Bent::load(object, loader, normals)?))
+    Ok(Arc::new(Perturbed::load(object, loader, normals)?))
 }
 
 struct Normals(Arc<dyn Texture>);
 
-impl Bend for Normals {
+impl NormalMap for Normals {
     fn normal(&self, surface: &Surface) -> Vec3 {
         (2.0 * self.0.color(&surface.at) - Rgb::ONE).normalize_or(Vec3::Z)
     }

@@ -25,7 +25,7 @@ fn make(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Bsdf>> {
     Ok(Arc::new(Plastic { eta, base }))
 }
 
-/// What smooth and rough plastic share: the diffuse base under a coat, and how often each is sampled.
+/// Common part of smooth and rough plastic: the diffuse base under a coat, and the probabilities of sampling either.
 pub struct Base {
     diffuse: Arc<dyn Texture>,
     specular: Arc<dyn Texture>,

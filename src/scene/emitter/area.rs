@@ -16,7 +16,7 @@ pub struct Area {
 }
 
 impl Area {
-    /// A glowing shape and its number.
+    /// An emissive shape and its index.
     pub fn new(geometry: Arc<Geometry>, radiance: Arc<dyn Texture>, shape: u32) -> Self {
         Self { geometry, radiance, shape }
     }

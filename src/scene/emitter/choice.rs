@@ -1,11 +1,11 @@
-//! Which emitter lights a point.
+//! Choice of the emitter that next-event estimation samples for a point.
 
 use super::Emitter;
 use super::tree::Tree;
 use crate::math::Vec3;
 use crate::math::alias::Alias;
 
-/// With more emitters than this, those near a point are told from those far away.
+/// Largest number of emitters that are chosen by power alone; among more, distance counts, too.
 const MANY: usize = 100;
 
 /// The chances of a scene's emitters.
@@ -38,7 +38,7 @@ impl Choice {
         Some(Self { table: Alias::new(&weights)?, listed, tree: Tree::new(in_tree, emitters.len()) })
     }
 
-    /// The emitter that `u` in [0, 1) stands for at a point, and its chance.
+    /// The emitter that `u` in [0, 1) selects for a point, and its probability.
     #[inline]
     pub fn choose(&self, from: Vec3, u: f32) -> (usize, f32) {
         let (index, rest) = self.table.sample(u);

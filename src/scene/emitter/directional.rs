@@ -22,7 +22,7 @@ fn make(object: &Object, loader: &mut Loader) -> Result<Box<dyn Emitter>> {
 }
 
 struct Directional {
-    /// Where the light goes.
+    /// Direction that the light travels along.
     direction: Vec3,
     /// Power per area across the direction.
     irradiance: Rgb,

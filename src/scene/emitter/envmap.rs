@@ -31,7 +31,7 @@ fn make(object: &Object, loader: &mut Loader) -> Result<Box<dyn Emitter>> {
     Ok(Box::new(EnvMap::new(texels, scale, to_world)))
 }
 
-/// The image with what it takes to draw points of it.
+/// The image with its sampling density.
 pub struct EnvMap {
     texels: Arc<Texels>,
     scale: f32,

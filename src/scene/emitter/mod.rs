@@ -20,11 +20,11 @@ use super::{Bounds, Surface, texture};
 use crate::math::{Rgb, Vec2, Vec3};
 use std::sync::Arc;
 
-/// The emitters that stand by themselves in scene files. (`area` stands in a shape.)
+/// Emitters that are elements of their own in scene files; `area` is nested in a shape.
 pub const PLUGINS: &[Plugin<Box<dyn Emitter>>] =
     &[envmap::PLUGIN, constant::PLUGIN, point::PLUGIN, spot::PLUGIN, directional::PLUGIN];
 
-/// Where light starts.
+/// A point that emits light.
 #[derive(Clone, Copy, Debug)]
 pub enum Position {
     /// A point of a surface with its unit normal.
@@ -49,13 +49,13 @@ pub enum Position {
 /// A point of an emitter.
 #[derive(Clone, Copy, Debug)]
 pub struct LightPoint {
-    /// Where it is.
+    /// Position of the point.
     pub position: Position,
-    /// Where on its shape it is.
+    /// Position on its shape.
     pub at: texture::Point,
     /// Number of its emitter.
     pub emitter: u32,
-    /// Whether no other point of its emitter lights a position, so that no path can run into it.
+    /// Whether it is the emitter's only point, which no path can hit by scattering.
     pub delta: bool,
 }
 

@@ -6,7 +6,7 @@ use std::f32::consts::PI;
 use crate::math::Vec3;
 use crate::scene::Bounds;
 
-/// Where an emitter is and where it shines.
+/// Bounds of an emitter's positions and directions of emission.
 #[derive(Clone, Copy, Debug)]
 pub struct Extent {
     /// The box around it.
@@ -73,7 +73,7 @@ impl Tree {
         number
     }
 
-    /// The emitter that `u` in [0, 1) stands for at a point, and its chance; a chance of zero where none shines.
+    /// The emitter that `u` in [0, 1) selects for a point, and its probability; zero where no emitter reaches the point.
     pub fn choose(&self, from: Vec3, mut u: f32) -> (usize, f32) {
         let (mut at, mut chance) = (0, 1.0);
         while !self.nodes[at].is_emitter {
@@ -118,7 +118,7 @@ impl Node {
         let distance = from.distance(centre);
         let width = if distance > radius { (radius / distance).asin() } else { PI };
         let angle = axis.dot((from - centre).normalize_or(axis)).clamp(-1.0, 1.0).acos();
-        // Rounding must not hide what shines along the cone's rim.
+        // Rounding must not hide emission along the cone's rim.
         let closest = (angle - spread - width - 1e-3).max(0.0);
         // Something is left of every distance, so that chances are numbers even at the light itself.
         let squared = distance.max(radius).powi(2).max(1e-20);

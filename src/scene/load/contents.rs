@@ -14,18 +14,18 @@ use crate::scene::{Bounds, Group, Shape, bsdf};
 /// More shapes than this are taken for a mistake, such as merges of merges of merges.
 const MAX_SHAPES: usize = 1 << 20;
 
-/// What has been found so far.
+/// Shapes, groups and emitters found so far.
 #[derive(Default)]
 pub struct Contents {
-    /// Shapes that stand by themselves.
+    /// Shapes in world space.
     pub shapes: Vec<Shape>,
-    /// Groups, with where they are placed.
+    /// Groups with their instances.
     pub groups: Groups,
     /// Emitters, numbered as the shapes name them.
     pub emitters: Vec<Box<dyn Emitter>>,
 }
 
-/// Shapes that are placed together, with the box around them.
+/// Shapes that are instanced together, with their bounding box.
 #[derive(Default)]
 pub struct Groups {
     list: Vec<(Bounds, Group)>,
@@ -47,7 +47,7 @@ pub const CONTAINERS: &[(&str, &str)] = &[
 ];
 
 impl Contents {
-    /// Adds an emitter that stands by itself.
+    /// Adds an emitter that belongs to no shape.
     pub fn emitter(&mut self, object: &Object, loader: &mut Loader) -> Result<()> {
         let plugin = find(emitter::PLUGINS, object)?;
         let emitter = (plugin.make)(object, loader)?;
@@ -58,7 +58,7 @@ impl Contents {
         Ok(())
     }
 
-    /// Adds a shape, or the shapes it stands for.
+    /// Adds a shape, or the shapes that it consists of.
     pub fn shape(&mut self, object: &Rc<Object>, loader: &mut Loader) -> Result<()> {
         match object.plugin.as_str() {
             "instance" => self.instance(object, loader),
@@ -101,7 +101,7 @@ impl Contents {
         Ok(())
     }
 
-    /// A group, whose shapes are made when it is first asked for.
+    /// A group; its shapes are built when it is first instanced.
     fn group(&mut self, object: &Rc<Object>, loader: &mut Loader) -> Result<&mut (Bounds, Group)> {
         let Groups { list, by_origin } = &mut self.groups;
         if let Some(&index) = by_origin.get(&Rc::as_ptr(object)) {
@@ -142,7 +142,7 @@ fn children(object: &Object, loader: &Loader) -> Result<Vec<Rc<Object>>> {
     Ok(found)
 }
 
-/// A shape and the emitter that it is, if it glows.
+/// A shape with its emitter, if it is emissive.
 type Lit = (Shape, Option<Box<dyn Emitter>>);
 
 /// A shape with its emitter, which will have the numbers given; none when it has no area.

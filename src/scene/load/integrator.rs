@@ -1,11 +1,11 @@
-//! Integrators of scene files. All of them are path traced; what they say about depth is kept.
+//! Integrators of scene files. All of them are path traced, with their path depths.
 
 use super::Loader;
 use super::props::Object;
 use crate::error::Result;
 use crate::scene::Integrator;
 
-/// Plugins and what they take.
+/// Plugins and their parameters.
 pub const PLUGINS: &[(&str, &str)] = &[
     ("path", "max_depth = -1, rr_depth = 5, hide_emitters = false"),
     ("volpath", "as path; scenes have no media"),

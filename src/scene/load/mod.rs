@@ -1,5 +1,5 @@
 //! Scene files to a [`Scene`]: `xml` reads the text into objects, the plugin tables of the sibling folders turn
-//! objects into what they describe. Everything that can fail fails here.
+//! objects into shapes, materials and emitters. Everything that can fail fails here.
 
 mod contents;
 pub mod integrator;
@@ -34,7 +34,7 @@ const MAX_COST: usize = 1000;
 /// Films with more pixels than this are taken for a mistake.
 const MAX_PIXELS: u64 = 1 << 28;
 
-/// What the command line may say about a scene before it is read.
+/// Options that override the scene file.
 #[derive(Clone, Debug)]
 pub struct Options {
     /// Values for the file's `$name` parameters, over its `<default>`s.
@@ -53,7 +53,7 @@ impl Default for Options {
     }
 }
 
-/// One row of a plugin table: a `type`, what it is, what it takes and how it is made.
+/// One row of a plugin table: name, parameters and constructor.
 pub struct Plugin<T: 'static> {
     /// The `type` in scene files.
     pub name: &'static str,
@@ -66,7 +66,7 @@ pub struct Plugin<T: 'static> {
 /// Builds objects, each shared one once.
 pub struct Loader {
     tree: xml::Tree,
-    /// What has been built, with the number of objects that it goes through.
+    /// Objects that have been built, with the number of objects that each is made of.
     bsdfs: HashMap<*const Object, (Arc<dyn Bsdf>, usize)>,
     textures: HashMap<*const Object, (Arc<dyn Texture>, usize)>,
     bitmaps: HashMap<PathBuf, Arc<texture::Texels>>,
@@ -75,7 +75,7 @@ pub struct Loader {
     /// Every file that a property names.
     files: RefCell<BTreeSet<PathBuf>>,
     nesting: usize,
-    /// Objects that what is being built goes through so far.
+    /// Objects that the current one is nested in.
     cost: usize,
     /// Textures that need to know all shapes.
     pub attributes: Vec<texture::Unbound>,
@@ -86,7 +86,7 @@ pub fn load(path: &Path, options: &Options) -> Result<Scene> {
     build(path, xml::parse(path, None, &options.parameters)?, options)
 }
 
-/// Loads a scene from the text of a scene file. What it refers to is looked for in the current folder.
+/// Loads a scene from the text of a scene file. Files that it names are looked for in the current folder.
 pub fn load_text(text: &str, options: &Options) -> Result<Scene> {
     let path = Path::new("scene.xml");
     build(path, xml::parse(path, Some(text), &options.parameters)?, options)
@@ -94,7 +94,7 @@ pub fn load_text(text: &str, options: &Options) -> Result<Scene> {
 
 fn build(path: &Path, tree: xml::Tree, options: &Options) -> Result<Scene> {
     let objects = tree.objects.clone();
-    // Definitions that the text asks for belong to it.
+    // Definitions that the text uses belong to it.
     let used = |name: &str| tree.sources.iter().any(|source| source.contains(&format!("${name}")));
     let mut given: Vec<_> = options.parameters.iter().filter(|(name, _)| used(name)).collect();
     given.sort();
@@ -146,7 +146,7 @@ fn build(path: &Path, tree: xml::Tree, options: &Options) -> Result<Scene> {
     })
 }
 
-/// Plugins of Mitsuba 3 that are left out, and why or what to use instead.
+/// Plugins of Mitsuba 3 that are not supported, with the reason or a replacement.
 pub const UNSUPPORTED: &[(&str, &str, &str)] = &[
     ("emitter", "sunsky", "bake it into an envmap; its tables of measured skies are not at hand"),
     ("emitter", "directionalarea", "paths from the camera never meet its parallel light; use a spot or an area"),
@@ -165,7 +165,7 @@ pub const UNSUPPORTED: &[(&str, &str, &str)] = &[
     ("texture", "volume", "volumes are not supported"),
 ];
 
-/// The table's row for an object, or an error that says what to do.
+/// The table's row for an object, or an error that lists the known ones.
 pub fn find<'a, T>(table: &'a [Plugin<T>], object: &Object) -> Result<&'a Plugin<T>> {
     table.iter().find(|plugin| plugin.name == object.plugin).ok_or_else(|| {
         let (class, plugin) = (&object.class, &object.plugin);

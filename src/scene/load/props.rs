@@ -1,4 +1,4 @@
-//! What a plugin sees of its element: typed properties that must all be asked for.
+//! Typed properties of an element, as plugins read them: one that is never read is an error.
 
 use std::cell::Cell;
 use std::rc::Rc;
@@ -32,20 +32,20 @@ pub enum Value {
     Object(Rc<Object>),
 }
 
-/// A named value and where it stands.
+/// A named value and its location.
 #[derive(Debug)]
 pub struct Property {
     /// The `name` attribute; nested objects may have none.
     pub name: String,
     /// The value.
     pub value: Value,
-    /// Where it stands.
+    /// Location in the file.
     pub loc: SourceLoc,
     used: Cell<bool>,
 }
 
 impl Property {
-    /// A property nobody has asked for yet.
+    /// A property that has not been read yet.
     pub fn new(name: String, value: Value, loc: SourceLoc) -> Self {
         Self { name, value, loc, used: Cell::new(false) }
     }
@@ -60,14 +60,14 @@ impl Property {
     }
 }
 
-/// An element such as `<bsdf type="diffuse">` with what stands in it.
+/// An element such as `<bsdf type="diffuse">` with its properties.
 #[derive(Debug)]
 pub struct Object {
     /// The element's tag: shape, bsdf, emitter and so on.
     pub class: String,
     /// Its `type`.
     pub plugin: String,
-    /// Where it stands.
+    /// Location in the file.
     pub loc: SourceLoc,
     /// Everything in it, in order.
     pub properties: Vec<Property>,
@@ -182,7 +182,7 @@ impl Object {
         }
     }
 
-    /// Where `name` stands, or the object itself when it is absent.
+    /// Location of the property `name`, or of the object if it is absent.
     pub fn loc_of(&self, name: &str) -> SourceLoc {
         self.properties.iter().find(|property| property.name == name).map_or(&self.loc, |p| &p.loc).clone()
     }
@@ -199,7 +199,7 @@ impl Object {
         }
     }
 
-    /// Fails on the first property that nobody asked for; `supported` lists what there is.
+    /// Fails on the first property that was never read; `supported` lists the known ones.
     pub fn all_used(&self, supported: &str) -> Result<()> {
         match self.properties.iter().find(|property| !property.used.get()) {
             None => Ok(()),

@@ -25,9 +25,9 @@ const MAX_PARAMETER: usize = 1 << 16;
 
 /// A parsed scene file with everything it includes.
 pub struct Tree {
-    /// What stands directly under `<scene>`, in order.
+    /// Elements directly under `<scene>`, in order.
     pub objects: Vec<Rc<Object>>,
-    /// Every object with an `id`, wherever it stands.
+    /// Every object with an `id`, at any depth.
     pub ids: HashMap<String, Rc<Object>>,
     /// Folders to look for files in: the scene's own first, then those of `<path>`.
     pub folders: Vec<PathBuf>,

@@ -1,4 +1,4 @@
-//! Sixteen points of emitters.
+//! Sixteen emitter points.
 
 use super::info::LightTriangle;
 use super::{Rays, Surfaces, surfaces};
@@ -14,16 +14,16 @@ pub struct Lights {
     at: Lanes3,
     /// Normals of those on surfaces.
     n: Lanes3,
-    /// Which are on surfaces.
+    /// Lanes whose point lies on a surface.
     surface: Mask,
-    /// Which are at infinity.
+    /// Lanes whose point is at infinity.
     far: Mask,
-    /// Which are their emitters' only points, so that no path runs into them.
+    /// Lanes whose point is the only one of its emitter, which no path hits by scattering.
     pub delta: Mask,
     emitter: Bits,
-    /// Which are on evenly glowing meshes.
+    /// Lanes whose point lies on a mesh of uniform radiance.
     uniform_mesh: Mask,
-    /// Which are the same from everywhere, with their densities and radiance.
+    /// Lanes whose point is a direction of the environment image, with densities and radiance.
     envmap: Mask,
     envmap_pdf: Lanes,
     envmap_radiance: Lanes3,
@@ -50,7 +50,7 @@ impl Default for Lights {
 }
 
 impl Lights {
-    /// Replaces one of them.
+    /// Sets one lane.
     pub fn set(&mut self, lane: usize, point: LightPoint, uniform_mesh: bool) {
         let (at, n) = match point.position {
             Position::Surface { p, n } => (p, n),
@@ -68,7 +68,7 @@ impl Lights {
         self.points[lane] = point;
     }
 
-    /// One of them is in the sky.
+    /// Sets one lane to a direction of the environment image.
     fn set_envmap(&mut self, lane: usize, (direction, emitter): (Vec3, u32), pdf: f32, radiance: Rgb) {
         self.set(lane, LightPoint::at_infinity(direction, emitter), false);
         self.envmap.set(lane, true);
@@ -76,7 +76,7 @@ impl Lights {
         self.envmap_radiance.set(lane, radiance);
     }
 
-    /// One of them; of those in the sky only where they are.
+    /// The point of one lane; of the environment image only its direction.
     pub fn get(&self, lane: usize) -> LightPoint {
         if !self.uniform_mesh.get(lane) {
             return self.points[lane];
@@ -85,7 +85,7 @@ impl Lights {
         LightPoint { emitter: self.emitter.0[lane], ..LightPoint::drawn(position, Default::default()) }
     }
 
-    /// Unit directions towards them, and [`LightPoint::solid_angle`].
+    /// Unit directions towards the points, and [`LightPoint::solid_angle`].
     #[inline(always)]
     pub fn seen_from(&self, from: Lanes3) -> (Lanes3, Lanes) {
         let one = Lanes::splat(1.0);
@@ -100,7 +100,7 @@ impl Lights {
         (self.far.select3(self.at, direction), angle)
     }
 
-    /// Densities of running into them by scattering of density `pdf`: never, into only points.
+    /// Densities of hitting the points by scattering of density `pdf`: zero for emitters of a single point.
     #[inline(always)]
     pub fn scatter_pdf(&self, pdf: Lanes) -> Lanes {
         self.delta.select(Lanes::ZERO, pdf)
@@ -108,8 +108,8 @@ impl Lights {
 }
 
 impl Scene {
-    /// Emitter points for the active surfaces, with their densities per solid angle including the choice of emitter;
-    /// returns for which there is one.
+    /// Samples an emitter point for every active surface. Returns the lanes that have one, and densities per solid angle,
+    /// the choice of the emitter included.
     #[inline(always)]
     pub fn sample_lights(
         &self,
@@ -201,7 +201,8 @@ impl Scene {
         radiance
     }
 
-    /// Density with which [`Scene::sample_lights`] finds emitter points from elsewhere, where they have such solid angles.
+    /// Densities with which [`Scene::sample_lights`] samples the points from other surfaces, from which they have the given
+    /// solid angles.
     #[inline(always)]
     pub fn light_pdf(&self, lights: &Lights, (from, angle): (Lanes3, Lanes), active: Mask) -> Lanes {
         let mut density = Lanes::ZERO;
@@ -218,16 +219,16 @@ impl Scene {
         pdf
     }
 
-    /// Which emitter points light pass from to the surfaces, of the active ones.
+    /// Active lanes whose emitter point is visible from the surface.
     pub fn visible_packet(&self, from: &Surfaces, lights: &Lights, active: Mask) -> Mask {
         active & !self.accel.occluded_packet(&shadow_rays(self.accel.size(), from, lights), active)
     }
 
-    /// The point of an emitter as packets keep it, with its radiance and the density with which it would have been chosen
-    /// by whom it was met.
+    /// Sets one lane to an emitter point that a path has hit, with its radiance and the density with which it would have
+    /// been sampled.
     pub fn keep_light(&self, lights: &mut Lights, lane: usize, point: LightPoint, (radiance, pdf): (Rgb, f32)) {
         match point.position {
-            // After a delta lobe its density is not asked for, so that the next paths' must be.
+            // After a delta lobe the density is zero, but offsets may need it.
             Position::Infinity { direction } if self.envmap == Some(point.emitter) => {
                 let pdf = if pdf > 0.0 { pdf } else { self.emitter_pdf(Vec3::ZERO, &point) };
                 lights.set_envmap(lane, (direction, point.emitter), pdf, radiance);

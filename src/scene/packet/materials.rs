@@ -1,4 +1,4 @@
-//! How sixteen surfaces scatter.
+//! Scattering at sixteen surfaces.
 
 use std::f32::consts::{FRAC_1_PI, FRAC_PI_4};
 
@@ -9,19 +9,19 @@ use crate::math::vec2;
 use crate::scene::Scene;
 use crate::scene::bsdf::{BsdfSample, Eval, Lobe};
 
-/// The materials of surfaces.
+/// Materials of sixteen surfaces.
 #[derive(Clone, Debug)]
 pub struct Materials {
-    /// Which are diffuse and nothing else.
+    /// Lanes whose material is a diffuse lobe and nothing else.
     lambert: Mask,
     two_sided: Mask,
-    /// Reflectance of those.
+    /// Reflectance of diffuse materials.
     color: Lanes3,
     /// Smallest roughness of the smooth lobes, infinite for diffuse ones; negative without smooth lobes.
     pub roughness: Lanes,
 }
 
-/// The smooth lobes in pairs of directions, as [`Eval`] has them.
+/// Smooth lobes evaluated for pairs of directions, as in [`Eval`].
 #[derive(Clone, Copy, Debug)]
 pub struct Evals {
     /// f |cos θo|.
@@ -30,7 +30,7 @@ pub struct Evals {
     pub pdf: Lanes,
 }
 
-/// Sampled directions, as [`BsdfSample`] has them.
+/// Sampled directions, as in [`BsdfSample`].
 #[derive(Clone, Debug)]
 pub struct Scatters {
     /// Outgoing directions.
@@ -39,13 +39,13 @@ pub struct Scatters {
     pub weight: Lanes3,
     /// Densities.
     pub pdf: Lanes,
-    /// Lobes, by their number among [`LOBES`].
+    /// Lobes, as positions in [`LOBES`].
     lobe: Bits,
     /// Relative indices of refraction.
     pub eta: Lanes,
 }
 
-/// Smooth ones are number 0.
+/// Lobes by number; the smooth one is number 0.
 const LOBES: [Lobe; 4] = [Lobe::Smooth, Lobe::DeltaReflect, Lobe::DeltaTransmit, Lobe::Null];
 
 impl Default for Materials {
@@ -83,7 +83,7 @@ impl Scatters {
         self.eta.0[lane] = sample.eta;
     }
 
-    /// One of them.
+    /// The sample of one lane.
     pub fn get(&self, lane: usize) -> BsdfSample {
         BsdfSample {
             wo: self.wo.get(lane),
@@ -94,7 +94,7 @@ impl Scatters {
         }
     }
 
-    /// Which are of smooth lobes.
+    /// Lanes whose direction is one of a smooth lobe.
     #[inline(always)]
     pub fn smooth(&self) -> Mask {
         self.lobe.equal(0)
@@ -102,7 +102,7 @@ impl Scatters {
 }
 
 impl Materials {
-    /// Becomes the materials of the active ones of some surfaces.
+    /// Evaluates the materials of the active surfaces.
     pub fn evaluate(&mut self, scene: &Scene, surfaces: &Surfaces, active: Mask) {
         (self.lambert, self.two_sided) = (Mask::NONE, Mask::NONE);
         self.roughness = Lanes::splat(f32::INFINITY);
@@ -120,7 +120,7 @@ impl Materials {
         }
     }
 
-    /// Replaces one of them by one of others.
+    /// Copies one lane of other materials.
     #[inline(always)]
     pub fn copy(&mut self, to: usize, from: &Self, lane: usize) {
         self.lambert.0[to] = from.lambert.0[lane];
@@ -129,13 +129,13 @@ impl Materials {
         self.roughness.0[to] = from.roughness.0[lane];
     }
 
-    /// Which have smooth lobes.
+    /// Lanes whose material has a smooth lobe.
     #[inline(always)]
     pub fn smooth(&self) -> Mask {
         !self.roughness.less(Lanes::ZERO)
     }
 
-    /// Overall colour of one.
+    /// Albedo of one lane.
     pub fn albedo(&self, scene: &Scene, surfaces: &Surfaces, lane: usize) -> Rgb {
         if self.lambert.get(lane) {
             return self.color.get(lane).clamp(Rgb::ZERO, Rgb::ONE);
@@ -144,13 +144,13 @@ impl Materials {
         scene.bsdf(&surface).albedo(&surface)
     }
 
-    /// Heights over the side that scatters, of those that are diffuse: the back of a two-sided one is a front, too.
+    /// Cosines with respect to the side that scatters; a two-sided material scatters on the side of `wi`.
     #[inline(always)]
     fn height(&self, wi: Lanes3, w: Lanes) -> Lanes {
         (self.two_sided & wi.z.less(Lanes::ZERO)).select(-w, w)
     }
 
-    /// The smooth lobes of the active ones; the others' values are zero.
+    /// Evaluates the smooth lobes of the active lanes; the values of the others are zero.
     #[inline(always)]
     pub fn eval(&self, scene: &Scene, surfaces: &Surfaces, (wi, wo): (Lanes3, Lanes3), active: Mask) -> Evals {
         let (in_height, out_height) = (self.height(wi, wi.z), self.height(wi, wo.z));
@@ -164,7 +164,7 @@ impl Materials {
         evals
     }
 
-    /// Directions for the active ones; returns which have one.
+    /// Samples directions for the active lanes; returns the lanes that have one.
     #[inline(always)]
     pub fn sample(
         &self,

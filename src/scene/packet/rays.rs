@@ -7,25 +7,25 @@ use crate::scene::Ray;
 /// Rays, coordinate by coordinate.
 #[derive(Clone, Copy, Debug)]
 pub struct Rays {
-    /// Where they start.
+    /// Origins.
     pub origin: Lanes3,
-    /// Where they go.
+    /// Directions.
     pub direction: Lanes3,
-    /// Where they end, in lengths of the direction.
+    /// Lengths, in lengths of the direction.
     pub t_far: Lanes,
 }
 
 impl Rays {
-    /// Rays that go nowhere, to be replaced.
+    /// Rays of length zero, to be replaced.
     pub const NONE: Self = Self { origin: Lanes3::ZERO, direction: Lanes3::ZERO, t_far: Lanes::ZERO };
 
-    /// One of them.
+    /// The ray of one lane.
     #[inline(always)]
     pub fn get(&self, lane: usize) -> Ray {
         Ray { origin: self.origin.get(lane), direction: self.direction.get(lane), t_far: self.t_far.0[lane] }
     }
 
-    /// Replaces one of them.
+    /// Sets one lane.
     #[inline(always)]
     pub fn set(&mut self, lane: usize, ray: Ray) {
         self.origin.set(lane, ray.origin);

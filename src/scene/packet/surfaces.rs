@@ -54,13 +54,13 @@ pub struct Surfaces {
     pub n: Lanes3,
     /// Shading frames.
     pub frame: Frames,
-    /// Directions back to where the rays came from, in the shading frames.
+    /// Directions back along the rays, in the shading frames.
     pub wi: Lanes3,
-    /// How far rays start off the surfaces.
+    /// Distances of ray origins from the surfaces.
     pub epsilon: Lanes,
-    /// Numbers of their shapes.
+    /// Indices of the shapes.
     pub shape: Bits,
-    /// Which mesh_light; those that are met only.
+    /// Lanes whose surface is emissive; valid where a ray has hit something.
     pub emissive: Mask,
     uv: [Lanes; 2],
     barycentric: [Lanes; 2],
@@ -90,7 +90,7 @@ impl Default for Surfaces {
 }
 
 impl Surfaces {
-    /// One of them.
+    /// The surface of one lane.
     #[inline]
     pub fn get(&self, lane: usize) -> Surface {
         let frame = Frame { s: self.frame.s.get(lane), t: self.frame.t.get(lane), n: self.frame.n.get(lane) };
@@ -106,7 +106,7 @@ impl Surfaces {
         }
     }
 
-    /// Where textures are looked up on one of them.
+    /// Texture coordinates of one lane.
     #[inline]
     pub fn at(&self, lane: usize) -> texture::Point {
         texture::Point {
@@ -117,7 +117,7 @@ impl Surfaces {
         }
     }
 
-    /// Replaces one of them.
+    /// Sets one lane.
     pub fn set(&mut self, lane: usize, surface: &Surface) {
         self.p.set(lane, surface.p);
         self.n.set(lane, surface.n);
@@ -134,7 +134,7 @@ impl Surfaces {
         self.dp_dv.set(lane, surface.dp_dv);
     }
 
-    /// Replaces one of them by one of others.
+    /// Copies one lane of other surfaces.
     #[inline(always)]
     pub fn copy(&mut self, to: usize, from: &Self, lane: usize) {
         let copy3 = |to_lanes: &mut Lanes3, from_lanes: &Lanes3| to_lanes.set(to, from_lanes.get(lane));
@@ -155,14 +155,14 @@ impl Surfaces {
         }
     }
 
-    /// Where rays along `direction` start.
+    /// Origins of rays that leave along `direction`.
     #[inline(always)]
     pub fn leave(&self, direction: Lanes3) -> Lanes3 {
         offset(self.p, self.n, self.epsilon, direction)
     }
 }
 
-/// Points moved off their surfaces to the sides that `direction` leaves on.
+/// Points offset from their surfaces to the side that `direction` leaves on.
 #[inline(always)]
 pub(super) fn offset(p: Lanes3, n: Lanes3, epsilon: Lanes, direction: Lanes3) -> Lanes3 {
     p + n * epsilon.copysign(n.dot(direction))
@@ -175,7 +175,8 @@ pub(super) fn epsilon(p: Lanes3, scene_size: f32) -> Lanes {
 }
 
 impl Scene {
-    /// The first surfaces along the active rays, and which have one. `coherent`: they start and run close together.
+    /// Intersects the active rays with the scene; returns the lanes that hit a surface. `coherent`: the rays are close to
+    /// each other.
     pub fn intersect_packet(&self, rays: &Rays, active: Mask, coherent: bool, surfaces: &mut Surfaces) -> Mask {
         let hits = self.accel.intersect_packet(rays, active, coherent);
         let found = !Bits(hits.geometry).equal(u32::MAX) & active;
@@ -190,25 +191,25 @@ impl Scene {
         found
     }
 
-    /// Goes on to what camera rays show behind the emitters that they have met.
-    pub fn pass_emitters(&self, rays: &Rays, met: &mut Mask, surfaces: &mut Surfaces) {
-        for lane in (*met & surfaces.emissive).lanes() {
+    /// Replaces emitters that camera rays have hit by the surfaces behind them.
+    pub fn pass_emitters(&self, rays: &Rays, hit: &mut Mask, surfaces: &mut Surfaces) {
+        for lane in (*hit & surfaces.emissive).lanes() {
             surfaces.emissive.set(lane, false);
             match self.intersect_from_camera(rays.get(lane)) {
                 Some(surface) => surfaces.set(lane, &surface),
-                None => met.set(lane, false),
+                None => hit.set(lane, false),
             }
         }
     }
 
-    /// One of the surfaces as a point of its emitter, if it is one.
+    /// The surface of one lane as a point of its emitter, if it is emissive.
     #[inline]
     pub fn light_point_of(&self, surfaces: &Surfaces, lane: usize) -> Option<LightPoint> {
         let emitter = self.shape_infos[surfaces.shape.0[lane] as usize].emitter?;
         Some(LightPoint::on_surface(&surfaces.get(lane), emitter))
     }
 
-    /// Which surface points see those of others, of the active ones.
+    /// Active lanes whose surfaces are visible from each other.
     pub fn mutually_visible_packet(&self, a: &Surfaces, b: &Surfaces, active: Mask) -> Mask {
         active & !self.accel.occluded_packet(&between(a, b), active)
     }
@@ -221,7 +222,7 @@ fn between(a: &Surfaces, b: &Surfaces) -> Rays {
     Rays { origin, direction: end - origin, t_far: Lanes::splat(accel::SHADOW_END) }
 }
 
-/// The surfaces of those hits that are on plain meshes; returns the others.
+/// Completes the hits on meshes in lanes; returns the lanes of all other hits.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
 fn meshes(
     (shapes, shape_infos): (&[Shape], &[ShapeInfo]),

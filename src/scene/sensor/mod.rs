@@ -48,7 +48,7 @@ const LENS: &str = "aperture_radius, focus_distance = far_clip, fov or focal_len
     fov_axis = x (y, diagonal, smaller, larger), to_world, near_clip = 0.01, far_clip = 10000, \
     principal_point_offset_x = 0, principal_point_offset_y = 0, film, sampler";
 
-/// Plugins and what they take.
+/// Plugins and their parameters.
 pub const PLUGINS: &[(&str, &str)] = &[
     ("perspective", VIEW),
     ("thinlens", LENS),

@@ -56,7 +56,7 @@ impl Cylinder {
         texture::Point { uv: vec2(angle, height), ..texture::Point::default() }
     }
 
-    /// What a ray has hit.
+    /// The surface at the point that a ray has hit.
     pub fn surface(&self, hit: &Hit, ray: Ray) -> Surface {
         let local = self.to_object.transform_point3(ray.origin + ray.direction * hit.t);
         // The hit pulled onto the cylinder, as its distance is not exact.

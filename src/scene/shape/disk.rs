@@ -39,7 +39,7 @@ impl Disk {
         texture::Point { uv: vec2(local.length(), angle), ..texture::Point::default() }
     }
 
-    /// What a ray has hit.
+    /// The surface at the point that a ray has hit.
     pub fn surface(&self, hit: &Hit, ray: Ray) -> Surface {
         let local = self.to_object.transform_point3(ray.origin + ray.direction * hit.t).truncate();
         let outward = local.normalize_or(Vec2::X);

@@ -16,7 +16,7 @@ pub struct Mesh {
     pub positions: Arc<PaddedVertices>,
     /// Vertex numbers.
     pub triangles: Arc<Vec<[u32; 3]>>,
-    /// What a hit needs of each triangle, in one place of memory.
+    /// Positions and normals of every triangle, adjacent in memory, for hits.
     corners: Vec<Corners>,
     /// Texture coordinates, or none for barycentric ones.
     uvs: Vec<Vec2>,
@@ -134,7 +134,7 @@ impl Mesh {
         a * weights[0] + b * weights[1] + c * weights[2]
     }
 
-    /// What a ray has hit.
+    /// The surface at the point that a ray has hit.
     #[inline]
     pub fn surface(&self, hit: &Hit, ray: Ray, derivatives: bool) -> Surface {
         let corners = self.corners(hit.primitive);

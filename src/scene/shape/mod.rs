@@ -106,7 +106,7 @@ pub enum Geometry {
 }
 
 impl Geometry {
-    /// What a ray has hit. `derivatives`: whether dp_du and dp_dv are wanted.
+    /// The surface at the point that a ray has hit. `derivatives`: whether dp_du and dp_dv are wanted.
     #[inline]
     pub fn surface(&self, hit: &Hit, ray: Ray, derivatives: bool) -> Surface {
         match self {

@@ -58,7 +58,7 @@ impl Sphere {
         vec2(phi.rem_euclid(TAU) / TAU, local.z.clamp(-1.0, 1.0).acos() * FRAC_1_PI)
     }
 
-    /// What a ray has hit.
+    /// The surface at the point that a ray has hit.
     pub fn surface(&self, hit: &Hit, ray: Ray, derivatives: bool) -> Surface {
         // The hit pulled onto the sphere: its distance is less exact than its direction from the centre.
         let outward = (ray.origin + ray.direction * hit.t - self.center).normalize_or(-ray.direction);
@@ -119,7 +119,7 @@ impl Sphere {
         let axis = self.center - from;
         let distance = axis.length();
         let local = warp::cone(u, versine);
-        // The nearer of the two points where the direction meets the sphere.
+        // The nearer of the two intersections of the direction with the sphere.
         let half_chord2 = self.radius * self.radius - distance * distance * (1.0 - local.z * local.z);
         let along = distance * local.z - half_chord2.max(0.0).sqrt();
         let p = from + Frame::around(axis / distance).to_world(local) * along;

@@ -62,7 +62,7 @@ struct Bitmap {
     wrap: Wrap,
     raw: bool,
     to_uv: UvTransform,
-    /// Taken when it is first asked for: most textures never are.
+    /// Computed when it is first used: most textures never need it.
     mean: OnceLock<f32>,
 }
 

@@ -28,7 +28,7 @@ struct Checkerboard {
 }
 
 impl Checkerboard {
-    /// Which square a point is in: 0 for the one at the origin, 1 for its neighbours.
+    /// Parity of the square that contains a point: 0 for the square at the origin, 1 for its neighbours.
     fn square(&self, at: &Point) -> usize {
         let cell = self.to_uv.apply(at.uv);
         let half = (cell - cell.floor()).cmpgt(Vec2::splat(0.5));

@@ -28,7 +28,7 @@ enum Samples {
     },
 }
 
-/// Room for texels, and what holds those that do not fit.
+/// Memory for texels, and the cache of images that do not fit.
 pub struct Memory {
     left: u64,
     system: Option<Arc<TextureSystem>>,
@@ -130,7 +130,7 @@ impl Texels {
     }
 }
 
-/// A texel that is not a number would poison every path that meets it.
+/// A texel that is not finite would spoil every path that hits it.
 fn finite(color: Rgb) -> Rgb {
     Rgb::from_array(color.to_array().map(|value| if value.is_finite() { value } else { 0.0 }))
 }

@@ -48,15 +48,15 @@ impl Prefix {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(u32)]
 pub enum Kind {
-    /// Its pixel lies outside the film.
+    /// The offset's pixel lies outside the film.
     OutOfFilm,
     /// The shift has failed.
     Failed,
-    /// It has a vertex of its own.
+    /// The offset has a vertex of its own.
     Unconnected,
-    /// It reaches the base path's vertex from a vertex of its own.
+    /// The offset reaches the base path's vertex from a vertex of its own.
     JustConnected,
-    /// It is the base path from an earlier vertex on.
+    /// The offset is the base path from an earlier vertex on.
     Connected,
 }
 

@@ -45,7 +45,7 @@ fn make(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Bsdf>> {
     }))
 }
 
-/// From `eta`, or from `specular`, which spans what common dielectrics reflect. Equal indices would leave nothing to
+/// From `eta`, or from `specular`, which spans the reflectance of common dielectrics. Equal indices would leave nothing to
 /// refract by, so the index is kept off one.
 fn relative_ior(object: &Object) -> Result<f32> {
     if object.get("eta").is_some() && object.get("specular").is_some() {

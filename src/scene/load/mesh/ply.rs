@@ -12,7 +12,7 @@ use crate::math::{Rgb, Vec3, vec2};
 /// Columns with a meaning of their own.
 const POSITION: &[&str] = &["x", "y", "z", "nx", "ny", "nz"];
 
-/// A vertex as the file has it; what it does not have stays zero.
+/// A vertex of the file; absent columns are zero.
 #[derive(Default)]
 struct Vertex {
     position: Vec3,

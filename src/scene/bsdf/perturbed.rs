@@ -1,4 +1,4 @@
-//! A material whose shading normal is bent by a texture: what bump maps and normal maps share.
+//! A material whose shading normal is perturbed by a texture: the common part of bump maps and normal maps.
 
 use std::sync::Arc;
 
@@ -9,33 +9,33 @@ use crate::scene::Surface;
 use crate::scene::load::Loader;
 use crate::scene::load::props::Object;
 
-/// Where the bent normal comes from.
-pub trait Bend: Send + Sync {
-    /// The bent normal in the shading frame, of length one.
+/// Source of the perturbed normal.
+pub trait NormalMap: Send + Sync {
+    /// The perturbed normal in the shading frame, of length one.
     fn normal(&self, surface: &Surface) -> Vec3;
 }
 
-/// The nested material under bent normals.
-pub struct Bent<B> {
-    bend: B,
-    /// Mirror a bent normal that faces away from the viewer.
+/// The nested material under perturbed normals.
+pub struct Perturbed<B> {
+    map: B,
+    /// Mirror a perturbed normal that faces away from the viewer.
     flip_invalid: bool,
-    /// Attenuate directions that the bumps would shadow, where the bent normal would otherwise cut light off.
+    /// Attenuate directions that the bumps would shadow, where the perturbed normal would otherwise cut light off.
     shadowing: bool,
     nested: Arc<dyn Bsdf>,
 }
 
-/// The bent frame, in coordinates of the unbent one.
+/// The perturbed frame, in coordinates of the unperturbed one.
 struct BentFrame {
     frame: Frame,
     shadow_alpha2: f32,
 }
 
-impl<B: Bend> Bent<B> {
-    /// Reads what all bent materials have beside `bend`.
-    pub fn load(object: &Object, loader: &mut Loader, bend: B) -> Result<Self> {
+impl<B: NormalMap> Perturbed<B> {
+    /// Reads the parameters that all perturbed materials share.
+    pub fn load(object: &Object, loader: &mut Loader, map: B) -> Result<Self> {
         Ok(Self {
-            bend,
+            map,
             flip_invalid: object.boolean("flip_invalid_normals", true)?,
             shadowing: object.boolean("use_shadowing_function", true)?,
             nested: loader.nested_bsdf(object)?,
@@ -43,7 +43,7 @@ impl<B: Bend> Bent<B> {
     }
 
     fn frame(&self, surface: &Surface, wi: Vec3) -> BentFrame {
-        let mut n = self.bend.normal(surface);
+        let mut n = self.map.normal(surface);
         if self.flip_invalid && wi.z * wi.dot(n) <= 0.0 {
             n = vec3(-n.x, -n.y, n.z);
         }
@@ -56,10 +56,10 @@ impl<B: Bend> Bent<B> {
 }
 
 impl BentFrame {
-    /// Both directions in the bent frame; `None` when the outgoing one changes sides.
+    /// Both directions in the perturbed frame; `None` when the outgoing one changes sides.
     fn map(&self, wi: Vec3, wo: Vec3) -> Option<(Vec3, Vec3)> {
-        let bent_wo = self.frame.to_local(wo);
-        (wo.z * bent_wo.z > 0.0).then(|| (self.frame.to_local(wi), bent_wo))
+        let perturbed_wo = self.frame.to_local(wo);
+        (wo.z * perturbed_wo.z > 0.0).then(|| (self.frame.to_local(wi), perturbed_wo))
     }
 
     fn shadow(&self, wo: Vec3) -> f32 {
@@ -68,29 +68,29 @@ impl BentFrame {
     }
 }
 
-impl<B: Bend> Bsdf for Bent<B> {
+impl<B: NormalMap> Bsdf for Perturbed<B> {
     fn sample(&self, surface: &Surface, wi: Vec3, lobe: f32, u: Vec2) -> Option<BsdfSample> {
-        let bent = self.frame(surface, wi);
-        let sample = self.nested.sample(surface, bent.frame.to_local(wi), lobe, u)?;
-        let wo = bent.frame.to_world(sample.wo);
+        let perturbed = self.frame(surface, wi);
+        let sample = self.nested.sample(surface, perturbed.frame.to_local(wi), lobe, u)?;
+        let wo = perturbed.frame.to_world(sample.wo);
         if wo.z * sample.wo.z <= 0.0 {
             return None;
         }
-        Some(BsdfSample { wo, weight: sample.weight * bent.shadow(wo), ..sample })
+        Some(BsdfSample { wo, weight: sample.weight * perturbed.shadow(wo), ..sample })
     }
 
     fn eval(&self, surface: &Surface, wi: Vec3, wo: Vec3) -> Eval {
-        let bent = self.frame(surface, wi);
-        let Some((bent_wi, bent_wo)) = bent.map(wi, wo) else { return Eval::default() };
-        let Eval { value, pdf } = self.nested.eval(surface, bent_wi, bent_wo);
-        Eval { value: value * bent.shadow(wo), pdf }
+        let perturbed = self.frame(surface, wi);
+        let Some((perturbed_wi, perturbed_wo)) = perturbed.map(wi, wo) else { return Eval::default() };
+        let Eval { value, pdf } = self.nested.eval(surface, perturbed_wi, perturbed_wo);
+        Eval { value: value * perturbed.shadow(wo), pdf }
     }
 
     fn delta(&self, surface: &Surface, wi: Vec3, lobe: Lobe) -> Option<Delta> {
-        let bent = self.frame(surface, wi);
-        let delta = self.nested.delta(surface, bent.frame.to_local(wi), lobe)?;
-        let wo = bent.frame.to_world(delta.wo);
-        (wo.z * delta.wo.z > 0.0).then(|| Delta { wo, value: delta.value * bent.shadow(wo), ..delta })
+        let perturbed = self.frame(surface, wi);
+        let delta = self.nested.delta(surface, perturbed.frame.to_local(wi), lobe)?;
+        let wo = perturbed.frame.to_world(delta.wo);
+        (wo.z * delta.wo.z > 0.0).then(|| Delta { wo, value: delta.value * perturbed.shadow(wo), ..delta })
     }
 
     fn roughness(&self, surface: &Surface) -> Option<f32> {
