@@ -12,15 +12,16 @@
 //! reconstructs an image from a frame, and the **plan** says what need not be computed for it. docs/glossary.md has all
 //! terms.
 //!
-//! ```no_run
+//! ```
 //! use fluxion::{Budget, Context, Control, RenderSettings, load, parse_method, render, solve};
 //!
 //! # fn main() -> fluxion::Result<()> {
-//! let scene = load("scene.xml".as_ref(), &Default::default())?;
+//! let scene = load("scenes/unit/diffuse/scene.xml".as_ref(), &Default::default())?;
 //! let method = parse_method("frgr")?;
-//! let settings = RenderSettings::new(Budget::Spp(64), method.needs());
+//! let settings = RenderSettings::new(Budget::Spp(4), method.needs());
 //! let frame = render(&scene, settings, &Control::QUIET).film.develop();
 //! let image = solve(method.as_ref(), &frame, &Context::QUIET)?.image;
+//! assert_eq!((image.width, image.height), (scene.sensor().width, scene.sensor().height));
 //! # Ok(())
 //! # }
 //! ```

@@ -77,14 +77,15 @@ impl Sample {
         let finite = |ok: bool, part| if ok { Ok(()) } else { Err(Rejected(part)) };
         let value = |value: f32| value.abs() <= LARGEST;
         let color = |color: &Rgb| color.abs().max_element() <= LARGEST && !color.is_nan();
-        let differences = self.differences.unwrap_or_default();
         finite(color(&self.color), "color")?;
         finite(color(&self.direct), "direct")?;
         let Features { occlusion, position, .. } = self.features;
         let mut features = self.features.surface().into_iter().chain([occlusion]).chain(position.to_array());
         finite(features.all(value), "features")?;
-        finite(color(&self.ambient) && differences.ambient.iter().all(color), "ambient light")?;
-        finite(differences.color.iter().all(color), "edges")
+        let differences =
+            |of: fn(&Differences) -> &[Rgb; 4]| self.differences.as_ref().is_none_or(|d| of(d).iter().all(color));
+        finite(color(&self.ambient) && differences(|d| &d.ambient), "ambient light")?;
+        finite(differences(|d| &d.color), "edges")
     }
 
     /// The sample that replaces a rejected one: zero, with differences if the rejected one has some.
@@ -94,12 +95,12 @@ impl Sample {
 
     /// Differences of the scattered radiance as one vector; zero if there are none.
     pub(super) fn color_differences(&self) -> [f32; 12] {
-        flatten(&self.differences.unwrap_or_default().color)
+        self.differences.as_ref().map_or([0.0; 12], |differences| flatten(&differences.color))
     }
 
     /// Differences of the ambient light as one vector; zero if there are none.
     pub(super) fn ambient_differences(&self) -> [f32; 12] {
-        flatten(&self.differences.unwrap_or_default().ambient)
+        self.differences.as_ref().map_or([0.0; 12], |differences| flatten(&differences.ambient))
     }
 }
 

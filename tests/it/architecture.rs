@@ -105,6 +105,124 @@ fn modules_use_only_what_they_may() {
 fn unsafe_code_is_in_ffi_and_files_are_short() {
     for (name, text) in sources() {
         assert!(name.starts_with("src/ffi/") || !text.contains("unsafe {"), "{name} holds unsafe code");
-        assert!(text.lines().count() <= 700, "{name} has more than 700 lines");
+        assert!(text.lines().count() <= 400, "{name} has more than 400 lines");
     }
+}
+
+/// Lines of every function, by the line that it starts on. Formatted code ends it by a brace at its own indentation.
+fn functions(text: &str) -> Vec<(usize, usize)> {
+    let lines: Vec<&str> = text.lines().collect();
+    let mut found = Vec::new();
+    for (start, line) in lines.iter().enumerate() {
+        let indentation = &line[..line.len() - line.trim_start().len()];
+        let words = line.trim_start().split([' ', '(', '<']).take_while(|word| !word.contains(':'));
+        if line.trim_end().ends_with(';')
+            || !words.take(5).any(|word| word == "fn")
+            || line.trim_start().starts_with("//")
+        {
+            continue;
+        }
+        let end = lines[start..].iter().position(|line| *line == format!("{indentation}}}"));
+        found.extend(end.map(|length| (start + 1, length + 1)));
+    }
+    found
+}
+
+#[test]
+fn functions_are_short() {
+    let mut long = Vec::new();
+    for (name, text) in sources() {
+        let too_long = functions(&text).into_iter().filter(|(_, length)| *length > 60);
+        long.extend(too_long.map(|(start, length)| format!("{name}:{start} has {length} lines")));
+    }
+    assert!(long.is_empty(), "{}", long.join("\n"));
+    assert_eq!(functions("fn a() {\n    1;\n}\n"), [(1, 3)]);
+}
+
+/// The file of a module path below `src`, or of the longest part of it that is a module.
+fn file_of(path: &[String], names: &[String]) -> Option<String> {
+    (1..=path.len()).rev().find_map(|length| {
+        let base = format!("src/{}", path[..length].join("/"));
+        [format!("{base}.rs"), format!("{base}/mod.rs")].into_iter().find(|file| names.contains(file))
+    })
+}
+
+/// Files that a file uses by `use` declarations.
+fn used_files(name: &str, text: &str, names: &[String]) -> Vec<String> {
+    let module = name.trim_start_matches("src/").trim_end_matches(".rs").trim_end_matches("/mod");
+    let here: Vec<String> = module.split('/').map(str::to_owned).collect();
+    let code = text.split("#[cfg(test)]").next().unwrap_or_default();
+    let mut used = Vec::new();
+    for declaration in code.split("use ").skip(1).filter_map(|rest| rest.split(';').next()) {
+        let (prefix, items) = declaration.split_once('{').unwrap_or((declaration, ""));
+        let mut path: Vec<String> = Vec::new();
+        for part in prefix.split("::").map(str::trim).filter(|part| !part.is_empty()) {
+            match part {
+                "crate" => path.clear(),
+                "self" => path = here.clone(),
+                "super" if path.is_empty() => path = here[..here.len() - 1].to_vec(),
+                "super" => drop(path.pop()),
+                part => path.push(part.to_owned()),
+            }
+        }
+        let starts_here = ["crate", "self", "super"].iter().any(|start| prefix.trim_start().starts_with(start));
+        if !starts_here {
+            continue;
+        }
+        used.extend(file_of(&path, names));
+        for item in items.trim_end_matches('}').split(',').map(str::trim).filter(|item| !item.is_empty()) {
+            let full = path.iter().cloned().chain(item.split("::").map(|part| part.trim().to_owned()));
+            used.extend(file_of(&full.collect::<Vec<_>>(), names));
+        }
+    }
+    used.retain(|file| file != name);
+    used
+}
+
+/// A folder's `mod.rs` holds a trait and the table of the rows that implement it, so it and the files below it name each
+/// other; every other circle of files stays within one folder.
+#[test]
+fn files_of_different_folders_are_in_no_circle() {
+    let sources = sources();
+    let names: Vec<String> = sources.iter().map(|(name, _)| name.clone()).collect();
+    let folder = |name: &str| name.rsplit_once('/').unwrap().0.to_owned();
+    let uses: Vec<Vec<usize>> = sources
+        .iter()
+        .map(|(name, text)| {
+            let is_table_of = |file: &str| name.ends_with("/mod.rs") && file.starts_with(&format!("{}/", folder(name)));
+            let used = used_files(name, text, &names);
+            let outward = used.iter().filter(|file| !is_table_of(file));
+            outward.map(|file| names.iter().position(|other| other == file).unwrap()).collect()
+        })
+        .collect();
+    assert!(uses.iter().map(Vec::len).sum::<usize>() > 500, "hardly any file uses another: are declarations read?");
+    let mut circles = Vec::new();
+    for start in 0..names.len() {
+        // Everything that can be reached from here; if this is among it, by way of another folder, there is a circle.
+        let (mut reached, mut open) = (vec![false; names.len()], vec![start]);
+        while let Some(at) = open.pop() {
+            for &next in &uses[at] {
+                if !std::mem::replace(&mut reached[next], true) {
+                    open.push(next);
+                }
+            }
+        }
+        if reached[start] {
+            let back = |&other: &usize| {
+                let (mut seen, mut open) = (vec![false; names.len()], vec![other]);
+                while let Some(at) = open.pop() {
+                    for &next in &uses[at] {
+                        if !std::mem::replace(&mut seen[next], true) {
+                            open.push(next);
+                        }
+                    }
+                }
+                seen[start]
+            };
+            let others =
+                (0..names.len()).filter(|&other| reached[other] && folder(&names[other]) != folder(&names[start]));
+            circles.extend(others.filter(back).map(|other| format!("{} and {}", names[start], names[other])));
+        }
+    }
+    assert!(circles.is_empty(), "{}", circles.join("\n"));
 }

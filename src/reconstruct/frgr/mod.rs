@@ -115,7 +115,6 @@ impl Reconstruction for Frgr {
     }
 
     fn reconstruct(&self, frame: &Frame, context: &Context) -> Result<Solution> {
-        frame.cross()?;
         (context.progress)("clean", 0.0);
         let inputs = Inputs::new(frame, 1 << (self.levels - 1))?;
         let rows = rows(&inputs, context.memory)?;
