@@ -9,26 +9,21 @@ SCENES holds folders of public scenes (kitchen, veach-ajar, veach-mis), REFERENC
 `fluxion bench` takes them; bundled scenes bring their own. Needs the Python packages numpy and OpenImageIO, and
 `cargo build --release`.
 """
+import argparse
 import json
 import os
 import subprocess
-import sys
 import tempfile
 
 import numpy as np
-import OpenImageIO as oiio
+
+import exr
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 FLUXION = os.path.join(ROOT, "target", "release", "fluxion")
 BUNDLED = ["cornell-box", "door-ajar", "glossy-metal", "glass-caustic"]
 PUBLIC = ["kitchen", "veach-ajar", "veach-mis"]
 EPSILON = 0.01
-
-
-def channels(path, names):
-    image = oiio.ImageBuf(path)
-    there = image.spec().channelnames
-    return image.get_pixels(oiio.FLOAT)[:, :, [there.index(name) for name in names]].astype(np.float64)
 
 
 class Case:
@@ -38,7 +33,7 @@ class Case:
         self.name = name
         self.scene = os.path.join(folder, name, "scene.xml")
         path = os.path.join(folder, name, "reference.exr") if bundled else os.path.join(references, name + ".exr")
-        self.truth = channels(path, "RGB")
+        self.truth = exr.rgb(path)
 
     def render(self, *arguments):
         """The image, its estimated squared error, and the statistics of the run."""
@@ -47,9 +42,9 @@ class Case:
             image, stats = f"{folder}/a.exr", f"{folder}/a.json"
             subprocess.run([FLUXION, "render", "-q", self.scene, "-o", image, "--size", f"{width}x{height}",
                             "--seed", "11", "--json", stats, *map(str, arguments)], check=True)
-            names = oiio.ImageBuf(image).spec().channelnames
-            error = channels(image, [f"error.{c}" for c in "RGB"]) if "error.R" in names else None
-            return channels(image, "RGB"), error, json.load(open(stats))
+            error = [f"error.{c}" for c in "RGB"]
+            error = exr.channels(image, error).astype(np.float64) if error[0] in exr.names(image) else None
+            return exr.rgb(image), error, json.load(open(stats))
 
     def errors(self, image):
         return ((image - self.truth) ** 2 / (self.truth ** 2 + EPSILON)).mean(2)
@@ -80,10 +75,7 @@ def calibration(cases, plot):
             if method == "apr":
                 panels.append(panel(blocks(estimated), blocks(true)))
         print(f"| {method} | " + " | ".join(row) + " |", flush=True)
-    picture = np.concatenate(panels, axis=1).astype(np.float32)
-    out = oiio.ImageBuf(oiio.ImageSpec(picture.shape[1], picture.shape[0], 3, oiio.UINT8))
-    out.set_pixels(oiio.ROI(), np.ascontiguousarray(picture))
-    out.write(plot)
+    exr.write(plot, np.concatenate(panels, axis=1), exr.EIGHT_BIT)
 
 
 def panel(estimated, true, side=240, low=-7.0, high=0.0):
@@ -102,7 +94,7 @@ def panel(estimated, true, side=240, low=-7.0, high=0.0):
 
 
 def gain(cases, spp, methods):
-    """relMSE with adaptive over that with uniform samples, as many of both."""
+    """relMSE with adaptive over that with uniform samples, at the same number of samples."""
     print(f"| {spp} spp | " + " | ".join(case.name for case in cases) + " | geometric mean |")
     print("|---" * (len(cases) + 2) + "|")
     for method in methods:
@@ -116,8 +108,8 @@ def gain(cases, spp, methods):
 
 
 def stop(cases, methods):
-    """True relMSE over the one asked for, and samples per pixel, at the stop; one minute at most."""
-    print("| method, asked for | " + " | ".join(case.name for case in cases) + " |")
+    """True relMSE over the target, and samples per pixel, at the stop; one minute at most."""
+    print("| method, target | " + " | ".join(case.name for case in cases) + " |")
     print("|---" * (len(cases) + 1) + "|")
     for method in methods:
         for target in [0.01, 0.002]:
@@ -131,18 +123,23 @@ def stop(cases, methods):
 
 
 def main():
-    if len(sys.argv) < 5:
-        sys.exit(__doc__)
-    scenes, references, command, *rest = sys.argv[1:]
-    every = [Case(name, scenes, references) for name in BUNDLED + PUBLIC]
-    if command == "calibration":
-        calibration([case for case in every if case.name in ("door-ajar", "glossy-metal", "kitchen", "veach-ajar")], rest[0])
-    elif command == "gain":
-        gain(every, int(rest[0]), rest[1:])
-    elif command == "stop":
-        stop(every[:5], rest)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("scenes", help="folder of public scenes")
+    parser.add_argument("references", help="folder of their references")
+    commands = parser.add_subparsers(dest="command", required=True)
+    commands.add_parser("calibration").add_argument("plot", help="image file to write")
+    command = commands.add_parser("gain")
+    command.add_argument("spp", type=int)
+    command.add_argument("methods", nargs="+")
+    commands.add_parser("stop").add_argument("methods", nargs="+")
+    args = parser.parse_args()
+    cases = [Case(name, args.scenes, args.references) for name in BUNDLED + PUBLIC]
+    if args.command == "calibration":
+        calibration([case for case in cases if case.name in ("door-ajar", "glossy-metal", "kitchen", "veach-ajar")], args.plot)
+    elif args.command == "gain":
+        gain(cases, args.spp, args.methods)
     else:
-        sys.exit(__doc__)
+        stop(cases[:5], args.methods)
 
 
 if __name__ == "__main__":

@@ -11,6 +11,7 @@ SCENES is a folder with NAME/scene.xml; REFERENCES one with NAME.exr (mean) and 
 box filtered. Run from the repository's top folder after `cargo build --release`. Needs PyPI openimageio and numpy, and
 mitsuba for `speed`, `bundled` and `loading` (with DRJIT_LIBLLVM_PATH naming libLLVM for the LLVM variant).
 """
+import argparse
 import json
 import os
 import statistics
@@ -21,20 +22,14 @@ import time
 import xml.etree.ElementTree as ET
 
 import numpy as np
-import OpenImageIO as oiio
+
+import exr
 
 FLUXION = "target/release/fluxion"
 SIZES = {"cornell-box": (256, 256), "veach-mis": (320, 180), "veach-ajar": (320, 180), "kitchen": (320, 180),
          "living-room": (320, 180)}
 UNIT = ["diffuse", "rough-conductor", "dielectric", "environment", "occluder", "plastic", "rough-plastic", "mask", "bump",
         "thin-pane", "sphere-light", "mirror-rooms", "lens", "rough-glass", "instances", "principled", "normal-map"]
-
-
-def read(path):
-    """Channels by name."""
-    buffer = oiio.ImageBuf(path)
-    pixels = buffer.get_pixels(oiio.FLOAT)
-    return {name: pixels[..., i].astype(np.float64) for i, name in enumerate(buffer.spec().channelnames)}
 
 
 def rgb(channels, prefix=""):
@@ -49,7 +44,7 @@ def fluxion(scene, size, spp, method, seed=1, extra=()):
                         "--size", "%dx%d" % size, "--spp", str(spp), "--seed", str(seed), "--method", method, *extra],
                        check=True)
         with open(at("s.json")) as file:
-            return rgb(read(at("o.exr"))), read(at("l.exr")), json.load(file)
+            return rgb(exr.everything(at("o.exr"))), exr.everything(at("l.exr")), json.load(file)
 
 
 def z_row(name, mean, variance, reference, reference_variance, rest=""):
@@ -95,7 +90,7 @@ def radiance(scenes, references, spp="512", only="", program="fluxion"):
     for name, scene, reference, variance, of_sample in public_scenes(scenes, references):
         if only not in name:
             continue
-        expected, theirs = rgb(read(reference)), rgb(read(variance))
+        expected, theirs = rgb(exr.everything(reference)), rgb(exr.everything(variance))
         samples = 4 * int(spp) if of_sample else int(spp)
         if name == "texture_interp":
             # Its reference was filtered with a Gaussian: a new one is rendered.
@@ -144,9 +139,9 @@ def gradients(spp="128", runs=16):
 def correlation(scenes, references, spp="64"):
     print("| scene | relMSE of primal | relMSE of l2 | l2 / primal | floor of the reference |\n|---|---|---|---|---|")
     for name, size in SIZES.items():
-        reference = rgb(read(os.path.join(references, name + ".exr")))
+        reference = rgb(exr.everything(os.path.join(references, name + ".exr")))
         weight = 1 / (reference * reference + 0.01)
-        floor = (rgb(read(os.path.join(references, name + "_var.exr"))) * weight).mean()
+        floor = (rgb(exr.everything(os.path.join(references, name + "_var.exr"))) * weight).mean()
         image, layers, _ = fluxion(os.path.join(scenes, name, "scene.xml"), size, int(spp), "l2")
         primal = rgb(layers) + rgb(layers, "direct.")
         # The reference's own noise is in both figures: it is taken off.
@@ -253,7 +248,28 @@ def loading(scenes, *names):
             name, *ours, *scalar, *llvm, ours[0] / scalar[0], ours[0] / llvm[0]), flush=True)
 
 
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    commands = parser.add_subparsers(dest="command", required=True)
+    for table, folders, spp in ((radiance, ("scenes", "references"), 512), (gradients, (), 128),
+                                (correlation, ("scenes", "references"), 64), (speed, ("scenes",), 8), (bundled, (), 1024)):
+        command = commands.add_parser(table.__name__, help=table.__doc__)
+        for folder in folders:
+            command.add_argument(folder)
+        command.add_argument("spp", nargs="?", type=int, default=spp)
+        command.set_defaults(table=table)
+        if table is radiance:
+            command.add_argument("only", nargs="?", default="")
+            command.add_argument("program", nargs="?", choices=["fluxion", "mitsuba"], default="fluxion")
+    command = commands.add_parser("loading", help=loading.__doc__)
+    command.add_argument("scenes")
+    command.add_argument("names", nargs="*")
+    command.set_defaults(table=lambda scenes, names: loading(scenes, *names))
+    args = vars(parser.parse_args())
+    table = args.pop("table")
+    args.pop("command")
+    table(*args.values())
+
+
 if __name__ == "__main__":
-    if len(sys.argv) < 2 or sys.argv[1] not in ("radiance", "gradients", "correlation", "speed", "bundled", "loading"):
-        sys.exit(__doc__)
-    globals()[sys.argv[1]](*sys.argv[2:])
+    main()

@@ -1,4 +1,4 @@
-"""EXR files as arrays, for the tools of this folder. Needs the Python packages numpy and OpenImageIO."""
+"""Image files as arrays, for the tools of this folder. Needs the Python packages numpy and OpenImageIO."""
 import numpy as np
 import OpenImageIO as oiio
 
@@ -20,6 +20,18 @@ def rgb(path):
     return channels(path, "RGB").astype(np.float64)
 
 
-def attribute(path, name):
-    """A header attribute as a text; empty where there is none."""
-    return oiio.ImageBuf(str(path)).spec().get_string_attribute(name)
+def everything(path):
+    """All channels in double precision, by name."""
+    wanted = names(path)
+    pixels = channels(path, wanted).astype(np.float64)
+    return {name: pixels[:, :, k] for k, name in enumerate(wanted)}
+
+
+def write(path, picture, kind=oiio.FLOAT):
+    """Writes an RGB image; formats of eight bits take values in [0, 1] and `kind=exr.EIGHT_BIT`."""
+    out = oiio.ImageBuf(oiio.ImageSpec(picture.shape[1], picture.shape[0], 3, kind))
+    out.set_pixels(oiio.ROI(), np.ascontiguousarray(picture, dtype=np.float32))
+    out.write(str(path))
+
+
+EIGHT_BIT = oiio.UINT8

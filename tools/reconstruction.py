@@ -7,14 +7,15 @@ SHARED holds folders of public scenes (kitchen, living-room, staircase, veach-mi
 rendered, so that a second run only reconstructs: WORK/in/SCENE-SPP.exr are layers, WORK/ref/SCENE-SEED.exr the two
 halves of a reference. Needs the Python packages numpy and OpenImageIO, and `cargo build --release`.
 """
+import argparse
 import json
 import math
 import os
 import subprocess
-import sys
 
 import numpy as np
-import OpenImageIO as oiio
+
+import exr
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 FLUXION = os.path.join(ROOT, "target", "release", "fluxion")
@@ -53,12 +54,6 @@ def layers(work, shared, name, spp):
     return path
 
 
-def rgb(path):
-    image = oiio.ImageBuf(path)
-    names = image.spec().channelnames
-    return image.get_pixels(oiio.FLOAT)[:, :, [names.index(c) for c in "RGB"]]
-
-
 def reference(work, shared, name):
     """The mean of two halves, as a file, and its noise: the relative squared error it has itself."""
     size, spp, method = SCENES[name]
@@ -68,12 +63,10 @@ def reference(work, shared, name):
         if not os.path.exists(path):
             run("render", "-q", scene(name, shared), "--size", size, "--spp", str(spp), "--seed", str(seed),
                 "--method", method, "-o", path)
-        halves.append(rgb(path).astype(np.float64))
+        halves.append(exr.rgb(path))
     mean = (halves[0] + halves[1]) / 2
     path = f"{work}/ref/{name}.exr"
-    out = oiio.ImageBuf(oiio.ImageSpec(mean.shape[1], mean.shape[0], 3, oiio.FLOAT))
-    out.set_pixels(oiio.ROI(), np.ascontiguousarray(mean, dtype=np.float32))
-    out.write(path)
+    exr.write(path, mean)
     return path, float(np.mean((halves[0] - halves[1]) ** 2 / 4 / (mean ** 2 + 0.01)))
 
 
@@ -146,12 +139,9 @@ def ablation(work, shared):
     print(f"| gradients | {' | '.join(scenes)} |\n|---|{'---|' * len(scenes)}")
     rows = {"sampled": [], "outliers removed": [], "paper": [], "code": [], "best": []}
     for name in scenes:
-        exact = rgb(reference(work, shared, name)[0]).astype(np.float64)
+        exact = exr.rgb(reference(work, shared, name)[0])
         exact_layers = layers(work, shared, name, 64)
-        image = oiio.ImageBuf(exact_layers)
-        names = image.spec().channelnames
-        pixels = image.get_pixels(oiio.FLOAT)
-        direct = pixels[:, :, [names.index(f"direct.{c}") for c in "RGB"]].max(2) > 0
+        direct = exr.channels(exact_layers, [f"direct.{c}" for c in "RGB"]).max(2) > 0
         # Away from lamps that are seen directly, whose light is not part of the differences.
         lit = direct[:, 1:] | direct[:, :-1]
         truth = exact[:, 1:] - exact[:, :-1]
@@ -160,14 +150,14 @@ def ablation(work, shared):
         def score(gradient):
             return float(np.mean((((gradient - truth) ** 2) * weight)[~lit]))
 
-        rows["sampled"].append(score(pixels[:, :-1, [names.index(f"dx.{c}") for c in "RGB"]]))
+        rows["sampled"].append(score(exr.channels(exact_layers, [f"dx.{c}" for c in "RGB"])[:, :-1]))
         for form in ("paper", "code", "best"):
             run("reconstruct", "-q", exact_layers, "-o", f"{work}/out.exr", "--method", f"frgr:form={form}",
                 "--notes", f"{work}/notes")
-            enhanced = rgb(f"{work}/notes/level0_enhanced.exr").astype(np.float64)
+            enhanced = exr.rgb(f"{work}/notes/level0_enhanced.exr")
             rows[form].append(score(enhanced[:, 1:] - enhanced[:, :-1]))
             if form == "best":
-                rows["outliers removed"].append(score(rgb(f"{work}/notes/dx.exr")[:, :-1]))
+                rows["outliers removed"].append(score(exr.rgb(f"{work}/notes/dx.exr")[:, :-1]))
     for label, row in rows.items():
         print(f"| {label} | {' | '.join(f'{value:.3g}' for value in row)} |")
 
@@ -180,9 +170,18 @@ def floors(work, shared):
 
 CACHE = {}
 
-if __name__ == "__main__":
-    if len(sys.argv) != 4 or sys.argv[3] not in ("methods", "time", "ablation", "floors"):
-        sys.exit(__doc__)
+
+def main():
+    tables = {"methods": methods, "time": time, "ablation": ablation, "floors": floors}
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("work", help="folder that keeps what was rendered")
+    parser.add_argument("shared", help="folder of public scenes")
+    parser.add_argument("table", choices=tables)
+    args = parser.parse_args()
     for folder in ("in", "ref"):
-        os.makedirs(os.path.join(sys.argv[1], folder), exist_ok=True)
-    globals()[sys.argv[3]](sys.argv[1], sys.argv[2])
+        os.makedirs(os.path.join(args.work, folder), exist_ok=True)
+    tables[args.table](args.work, args.shared)
+
+
+if __name__ == "__main__":
+    main()

@@ -85,7 +85,7 @@ fn name(path: &Path) -> String {
 fn find(path: &Path, name: &str, reference: Option<&Path>) -> Result<PathBuf> {
     let folder = path.parent().map_or(PathBuf::from("."), Path::to_path_buf);
     let file = format!("{name}.exr");
-    let places = match reference {
+    let candidates = match reference {
         Some(reference) if reference.is_dir() => vec![reference.join(file)],
         Some(reference) => vec![reference.to_path_buf()],
         None => vec![
@@ -94,9 +94,9 @@ fn find(path: &Path, name: &str, reference: Option<&Path>) -> Result<PathBuf> {
             Path::new("scenes/references").join(&file),
         ],
     };
-    places.iter().find(|place| place.is_file()).cloned().ok_or_else(|| {
-        let places: Vec<_> = places.iter().map(|place| place.display().to_string()).collect();
-        let what = format!("no reference at {}; `fluxion reference` makes one", places.join(", "));
+    candidates.iter().find(|path| path.is_file()).cloned().ok_or_else(|| {
+        let names: Vec<_> = candidates.iter().map(|path| path.display().to_string()).collect();
+        let what = format!("no reference at {}; `fluxion reference` makes one", names.join(", "));
         Error::io(path, what)
     })
 }

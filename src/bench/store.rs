@@ -18,14 +18,13 @@ pub struct Store {
 }
 
 impl Store {
-    /// Opens a folder, which is made if it is not there. Results that are there already must be meant to be gone on
-    /// with.
+    /// Opens a folder, which is created if necessary. Existing results are continued only if `resume` says so.
     pub fn open(folder: &Path, resume: bool) -> Result<Self> {
         std::fs::create_dir_all(folder.join("images")).map_err(|error| Error::io(folder, error))?;
         let file = folder.join("results.json");
         let results = if file.exists() { Results::load(&file)? } else { Results::default() };
         if !resume && !results.records.is_empty() {
-            let what = "holds results already: add --resume to go on with them, or name another folder";
+            let what = "holds results already: add --resume to continue them, or name another folder";
             return Err(Error::io(folder, what));
         }
         let store = Self { folder: folder.to_owned(), results };

@@ -119,7 +119,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     Ok(if failed.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-/// Methods of a list. Parts after a method's colon belong to it as long as they look like parameters.
+/// Methods of a list. Text after a method's colon belongs to it as long as it looks like parameters.
 fn methods(list: Option<&str>) -> Result<Vec<String>> {
     let mut methods: Vec<String> = Vec::new();
     match list {
@@ -248,7 +248,7 @@ fn warn_of_floors(results: &Results) {
         if floor > FLOOR_SHARE * least {
             eprintln!(
                 "warning: the reference of {scene} has a relMSE of {floor:.1e} itself, {:.0} % of the smallest error; \
-                 `fluxion reference` can go on with it",
+                 `fluxion reference` can continue it",
                 100.0 * floor / least
             );
         }

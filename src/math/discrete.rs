@@ -1,5 +1,5 @@
 //! Sampling an index, or a point of a grid, in proportion to given weights, by inversion of the cumulative sum: numbers
-//! that are close together stay on places that are.
+//! that are close together give positions that are.
 
 use super::lanes::{LANES, Mask};
 use super::{Vec2, vec2};
@@ -46,7 +46,7 @@ fn search(sums: &[u32], mut index: usize, u: f32) -> (usize, f32) {
     while index < last && sums[index + 1] <= target {
         index += 1;
     }
-    // Parts are found in floats, which may round up; and an entry without weight may stand beside the one meant.
+    // Positions are computed in floats, which may round up; and an entry without weight may stand beside the one meant.
     while index > 0 && (sums[index] > target || sums[index + 1] == sums[index]) {
         index -= 1;
     }

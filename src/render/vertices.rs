@@ -30,7 +30,7 @@ pub struct Vertices {
     pub next: Bits,
     /// Lanes whose next segment ends on an emitter.
     pub emits: Mask,
-    /// Those emitters.
+    /// Emitters at the ends of these segments.
     pub emission: Emission,
 }
 

@@ -65,7 +65,7 @@ pub struct Patches {
 }
 
 impl Patches {
-    /// Room for patches of so many radii, the largest `reach`.
+    /// Memory for patches of the given number of radii, the largest `reach`.
     pub fn new(tile: Tile, reach: usize, radii: usize) -> Self {
         let rows = tile.height + 2 * reach;
         let width = tile.width.next_multiple_of(LANES);

@@ -57,7 +57,7 @@ pub struct Problem<'a> {
     pub variance: &'a Planes,
     /// Cost of a squared weight.
     pub penalty: &'a Planes,
-    /// Terms of the objective, one to [`TERMS`] of them.
+    /// One to [`TERMS`] terms of the objective.
     pub terms: Vec<Term<'a>>,
     /// Radius of the window.
     pub radius: usize,

@@ -1,6 +1,6 @@
 //! Sixteen emitter points.
 
-use super::info::LightTriangle;
+use super::info::{LightTriangle, UniformMeshLight};
 use super::{Rays, Surfaces, surfaces};
 use crate::math::lanes::{Bits, LANES, Lanes, Lanes3, Mask};
 use crate::math::{Rgb, Vec3, vec2};
@@ -107,6 +107,48 @@ impl Lights {
     }
 }
 
+/// Emissive triangles that were sampled for sixteen surfaces.
+struct SampledTriangles {
+    /// Corner, both edges and normal, coordinate by coordinate.
+    triangles: [[[f32; LANES]; 3]; 4],
+    /// Random numbers that are left after the choice of a triangle.
+    rest: [f32; LANES],
+    /// Densities per area.
+    density: [f32; LANES],
+}
+
+impl SampledTriangles {
+    const NONE: Self = Self { triangles: [[[0.0; LANES]; 3]; 4], rest: [0.0; LANES], density: [0.0; LANES] };
+
+    /// Samples a triangle of a mesh for one lane; `density` is that of the whole choice, per area.
+    #[inline(always)]
+    fn set(&mut self, lane: usize, mesh_light: &UniformMeshLight, u: f32, density: f32) {
+        let (triangle, rest) = mesh_light.areas.sample(u);
+        let LightTriangle { corner, sides, n } = mesh_light.triangles[triangle];
+        for (to, from) in self.triangles.iter_mut().zip([corner, sides[0], sides[1], n]) {
+            (to[0][lane], to[1][lane], to[2][lane]) = from.into();
+        }
+        (self.rest[lane], self.density[lane]) = (rest, density);
+    }
+
+    /// Sets the points of the lanes on meshes of uniform radiance, uniformly over their triangles as `warp::triangle`.
+    /// Returns the lanes whose surface faces the point, with densities per solid angle.
+    #[inline(always)]
+    fn place(self, lights: &mut Lights, from: &Surfaces, u: Lanes) -> (Mask, Lanes) {
+        let [corner, side, other_side, n] =
+            self.triangles.map(|[x, y, z]| Lanes3 { x: Lanes(x), y: Lanes(y), z: Lanes(z) });
+        let one = Lanes::splat(1.0);
+        let root = (one - u).max(Lanes::ZERO).sqrt();
+        let p = corner + side * (one - root) + other_side * (Lanes(self.rest) * root);
+        let on_mesh = lights.uniform_mesh;
+        lights.at = on_mesh.select3(p, lights.at);
+        lights.n = on_mesh.select3(n, lights.n);
+        lights.surface = lights.surface | on_mesh;
+        let (_, angle) = lights.seen_from(from.p);
+        (on_mesh & angle.greater(Lanes::ZERO), Lanes(self.density) / angle)
+    }
+}
+
 impl Scene {
     /// Samples an emitter point for every active surface. Returns the lanes that have one, and densities per solid angle,
     /// the choice of the emitter included.
@@ -121,29 +163,23 @@ impl Scene {
         let mut found = Mask::NONE;
         let mut pdf = Lanes::ZERO;
         let Some(table) = self.emitter_choice.as_ref() else { return (found, pdf) };
-        let mut triangles = [[[0.0f32; LANES]; 3]; 4];
-        let (mut second, mut density) = ([0.0f32; LANES], [0.0f32; LANES]);
+        let mut triangles = SampledTriangles::NONE;
         (lights.delta, lights.far, lights.uniform_mesh, lights.envmap) =
             (Mask::NONE, Mask::NONE, Mask::NONE, Mask::NONE);
-        let mut above = Mask::NONE;
+        let mut on_envmap = Mask::NONE;
         for lane in active.lanes() {
             let (index, chance) = table.choose(from.p.get(lane), choice.0[lane]);
             let info = &self.emitter_infos[index];
             if let Some(mesh_light) = &info.mesh_light {
-                let (triangle, rest) = mesh_light.areas.sample(v.0[lane]);
-                let LightTriangle { corner, sides, n } = mesh_light.triangles[triangle];
-                for (to, from) in triangles.iter_mut().zip([corner, sides[0], sides[1], n]) {
-                    (to[0][lane], to[1][lane], to[2][lane]) = from.into();
-                }
-                second[lane] = rest;
-                density[lane] = if info.density > 0.0 { info.density } else { chance / mesh_light.area };
+                let density = if info.density > 0.0 { info.density } else { chance / mesh_light.area };
+                triangles.set(lane, mesh_light, v.0[lane], density);
                 lights.emitter.0[lane] = index as u32;
                 lights.uniform_mesh.set(lane, true);
                 continue;
             }
             let (p, emitter) = (from.p.get(lane), &self.emitters[index]);
             if self.envmap == Some(index as u32) {
-                above.set(lane, true);
+                on_envmap.set(lane, true);
                 pdf.0[lane] = chance;
                 continue;
             }
@@ -157,29 +193,18 @@ impl Scene {
             }
         }
         if let Some((index, map)) =
-            self.envmap.filter(|_| above.any()).and_then(|i| Some((i, self.emitters[i as usize].envmap()?)))
+            self.envmap.filter(|_| on_envmap.any()).and_then(|i| Some((i, self.emitters[i as usize].envmap()?)))
         {
-            let sky = map.sample_packet([u, v], above);
-            pdf = above.select(pdf * sky.pdf, pdf);
-            for lane in above.lanes() {
-                lights.set_envmap(lane, (sky.direction.get(lane), index), pdf.0[lane], sky.radiance.get(lane));
+            let sample = map.sample_packet([u, v], on_envmap);
+            pdf = on_envmap.select(pdf * sample.pdf, pdf);
+            for lane in on_envmap.lanes() {
+                lights.set_envmap(lane, (sample.direction.get(lane), index), pdf.0[lane], sample.radiance.get(lane));
             }
-            found = found | (above & pdf.greater(Lanes::ZERO));
+            found = found | (on_envmap & pdf.greater(Lanes::ZERO));
         }
-        let uniform_mesh = lights.uniform_mesh;
-        if uniform_mesh.any() {
-            let [corner, side, other_side, n] =
-                triangles.map(|[x, y, z]| Lanes3 { x: Lanes(x), y: Lanes(y), z: Lanes(z) });
-            // Uniform over a triangle, as `warp::triangle`.
-            let one = Lanes::splat(1.0);
-            let root = (one - u).max(Lanes::ZERO).sqrt();
-            let p = corner + side * (one - root) + other_side * (Lanes(second) * root);
-            lights.at = uniform_mesh.select3(p, lights.at);
-            lights.n = uniform_mesh.select3(n, lights.n);
-            lights.surface = lights.surface | uniform_mesh;
-            let (_, angle) = lights.seen_from(from.p);
-            let seen = uniform_mesh & angle.greater(Lanes::ZERO);
-            pdf = seen.select(Lanes(density) / angle, pdf);
+        if lights.uniform_mesh.any() {
+            let (seen, of_triangles) = triangles.place(lights, from, u);
+            pdf = seen.select(of_triangles, pdf);
             found = found | seen;
         }
         (found, pdf)

@@ -41,7 +41,7 @@ impl Texture for Checkerboard {
         self.colors[self.square(at)].color(at)
     }
 
-    /// Used as a number, the squares change places: so Mitsuba 3 has it, and the files of the field rely on it.
+    /// Used as a number, the squares are swapped: so Mitsuba 3 has it, and the files of the field rely on it.
     fn scalar(&self, at: &Point) -> f32 {
         self.colors[1 - self.square(at)].scalar(at)
     }

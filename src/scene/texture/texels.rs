@@ -40,7 +40,7 @@ const CACHE: u32 = 256;
 const MAX_CHANNELS: usize = 8;
 
 impl Memory {
-    /// Room for so many bytes.
+    /// Memory for so many bytes.
     pub fn new(bytes: u64) -> Self {
         Self { left: bytes, system: None }
     }
