@@ -28,9 +28,9 @@ impl Plan {
     pub fn new(scene: &Scene, method: Needs, saved: Needs) -> Self {
         let wanted = method.union(saved);
         let edges = match scatters_light(scene) {
-            // Known at no cost, whether or not the method asks.
-            Err(_) => EdgeNeed::KnownZero,
-            Ok(()) => wanted.edges,
+            // Known at no cost, whether or not the method asks; those of the ambient light have to be sampled.
+            Err(_) if !wanted.ambient => EdgeNeed::KnownZero,
+            _ => wanted.edges,
         };
         let needs = Needs { edges, ..wanted };
         let mut items = of_film(scene, method, saved, needs);
@@ -76,7 +76,8 @@ fn of_film(scene: &Scene, method: Needs, saved: Needs, needs: Needs) -> Vec<Item
         Item { name, computed, reason: reason.to_owned() }
     };
     let mut gradients = item("gradients", needs.edges.is_sampled(), method.edges.is_on(), saved.edges.is_on());
-    if let (true, Err(reason)) = (method.union(saved).edges.is_on(), scatters_light(scene)) {
+    let wanted = method.union(saved).edges.is_on();
+    if let (true, false, Err(reason)) = (wanted, needs.edges.is_sampled(), scatters_light(scene)) {
         gradients.reason = reason.to_owned();
     }
     vec![

@@ -190,7 +190,7 @@ def speed(scenes, spp="8"):
                 with tempfile.TemporaryDirectory() as folder:
                     stats = os.path.join(folder, "s.json")
                     subprocess.run([FLUXION, "render", path, "-o", os.path.join(folder, "o.exr"), "--json", stats, "-q",
-                                    "--size", "%dx%d" % size, "--spp", spp, "--seed", str(seed), "--method", method,
+                                    "--size", "%dx%d" % size, "--spp", str(spp), "--seed", str(seed), "--method", method,
                                     "--threads", "2"], check=True)
                     with open(stats) as file:
                         record = json.load(file)

@@ -4,12 +4,12 @@ use super::BINS;
 use crate::image::Image;
 use crate::math::Rgb;
 
-/// Undirected edges between any two pixels of an image, in compressed rows: the edges of a row lead from a pixel to
-/// pixels of higher index. Indices of pixels run row by row. Values are those of the lower end towards the higher one:
+/// Undirected edges between any two pixels of an image, in compressed sparse rows: one row for each pixel, with its edges to
+/// pixels of higher index. Pixels are numbered along the lines of the image. Values are those of the lower end towards the higher one:
 /// `mean[e]` estimates I(higher) - I(lower), in radiance.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Edges {
-    /// First edge of every pixel's row, and the number of edges.
+    /// Start of every pixel's row among the edges, and the end of the last: one entry more than there are pixels.
     rows: Vec<u32>,
     /// Lower and higher end of every edge.
     ends: Vec<[u32; 2]>,
@@ -17,7 +17,7 @@ pub struct Edges {
     offsets: Vec<(i32, i32)>,
     /// Position of every edge's step in `offsets`.
     kinds: Vec<u32>,
-    /// First entry of every pixel in `incident`, and the number of entries.
+    /// Start of every pixel's entries in `incident`, and the end of the last.
     incident_rows: Vec<u32>,
     /// Edges that have the pixel as an end, nearest ends first.
     incident: Vec<u32>,
@@ -25,14 +25,14 @@ pub struct Edges {
     pub mean: Vec<Rgb>,
     /// Variances of the means, in squared radiance; empty unless asked for.
     pub variance: Vec<Rgb>,
-    /// Samples that either end of an edge has at least; empty unless bins are asked for.
+    /// Number of samples with differences at the end that has fewer; empty unless bins are asked for.
     pub counts: Vec<u32>,
     /// Means of the bins; empty unless asked for.
     pub bins: Vec<[Rgb; BINS]>,
     /// Means of the bins of the ambient light's differences; empty unless asked for.
     pub ambient: Vec<[Rgb; BINS]>,
-    /// Weights of the neighbour's corrected value at the lower and at the higher end, against a weight of one of the
-    /// pixel's own value; empty unless whoever chose the edges gives some.
+    /// Weights of the neighbour's corrected value at the lower and at the higher end, relative to the pixel's own weight of
+    /// one; empty if the edges come without weights.
     pub weights: Vec<[f32; 2]>,
 }
 

@@ -93,11 +93,12 @@ impl Frame {
             Some(edges) => {
                 for (wanted, there, layer) in [
                     (parts.variance, !edges.variance.is_empty(), Layer::DxVariance),
-                    (parts.bins, !edges.bins.is_empty(), Layer::BinDx(0)),
+                    (parts.bins, !edges.bins.is_empty() && !edges.counts.is_empty(), Layer::BinDx(0)),
                     (parts.ambient, !edges.ambient.is_empty(), Layer::BinAmbientDx(0)),
                 ] {
                     if wanted && !there && !edges.is_empty() {
-                        self.require(layer)?;
+                        let remedy = "the frame's edges were made without it".into();
+                        return Err(Error::Missing { layer: layer.channel_names().join(", "), remedy });
                     }
                 }
                 Ok(Cow::Borrowed(edges))
@@ -131,7 +132,7 @@ impl Frame {
         Ok(edges)
     }
 
-    /// Samples with differences that either end of every edge has at least.
+    /// Number of samples with differences at the end of every edge that has fewer.
     fn edge_counts(&self, edges: &Edges) -> Result<Vec<u32>> {
         let samples = self.get(Layer::EdgeSamples).map_or_else(|| self.require(Layer::Samples), Ok)?;
         let least = |edge| edges.ends(edge).map(|end| samples.data[end] as u32).into_iter().min().unwrap_or(0);

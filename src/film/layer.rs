@@ -74,7 +74,7 @@ pub struct Info {
     pub unit: &'static str,
     /// Range of the values.
     pub range: &'static str,
-    /// The option of `render` that records it.
+    /// The option of `render` that records it; `always`, or a method as an example of those that need it.
     pub flag: &'static str,
     /// Description for tables.
     pub summary: &'static str,
@@ -147,7 +147,7 @@ const SINGLE: [(Layer, Info); 21] = {
                 XYZ,
                 ["1", "[-1, 1]", "--layers"],
                 Mean(Surface, 3),
-                "shading normal there, in world space, towards the viewer",
+                "shading normal of that surface, in world space, towards the viewer",
             ),
         ),
         (
@@ -161,7 +161,7 @@ const SINGLE: [(Layer, Info); 21] = {
                 &["Z"],
                 ["scene units", ">= 0", "--layers"],
                 Mean(Surface, 6),
-                "length of the path to there; beyond the scene where nothing is hit",
+                "length of the path to that surface; beyond the scene where nothing is hit",
             ),
         ),
         (
@@ -181,7 +181,7 @@ const SINGLE: [(Layer, Info); 21] = {
                 &["Y"],
                 ["1", "[0, 1]", "--occlusion"],
                 Mean(Occlusion, 0),
-                "ambient occlusion there: cosine-weighted share of directions that are free for a tenth of the scene's size",
+                "ambient occlusion of that surface: cosine-weighted share of directions that are free for a tenth of the scene's size",
             ),
         ),
         (
@@ -201,7 +201,7 @@ const SINGLE: [(Layer, Info); 21] = {
                 XYZ,
                 ["scene units", "any", "--position"],
                 Mean(Position, 0),
-                "the point, in world space; beyond the scene where nothing is hit",
+                "the point on that surface, in world space; beyond the scene where nothing is hit",
             ),
         ),
         (
@@ -265,14 +265,14 @@ const BINNED: [Info; 6] = {
             Bin(ColorBins),
             "colour of the samples whose number is k modulo 8",
         ),
-        info("bin_dx", RGB, DIFFERENCE, EdgeBin(EdgeBins, X), "dx of those samples"),
-        info("bin_dy", RGB, DIFFERENCE, EdgeBin(EdgeBins, Y), "dy of those samples"),
+        info("bin_dx", RGB, DIFFERENCE, EdgeBin(EdgeBins, X), "dx of the samples of bin k"),
+        info("bin_dy", RGB, DIFFERENCE, EdgeBin(EdgeBins, Y), "dy of the samples of bin k"),
         info(
             "bin_ambient",
             RGB,
             ["1", ">= 0", "--ambient"],
             Bin(AmbientBins),
-            "radiance that an unoccluded ambient light of radiance one would add to their colour",
+            "radiance that an unoccluded ambient light of radiance one would add to the colour of bin k",
         ),
         info("bin_ambient_dx", RGB, AMBIENT_DIFFERENCE, EdgeBin(AmbientEdgeBins, X), "dx of that radiance"),
         info("bin_ambient_dy", RGB, AMBIENT_DIFFERENCE, EdgeBin(AmbientEdgeBins, Y), "dy of that radiance"),

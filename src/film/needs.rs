@@ -21,7 +21,7 @@ pub struct Needs {
     pub ambient: bool,
 }
 
-/// Origin of the differences between pixels.
+/// How a film gets the differences between pixels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum EdgeNeed {
@@ -64,7 +64,7 @@ impl Needs {
     /// Bytes per pixel of a film, as long as the camera sees no emitter directly; 24 more where it does.
     pub fn bytes_per_pixel(self) -> usize {
         let counts = size_of::<u32>() * (1 + usize::from(self.edges.is_sampled()));
-        let recorded = STATISTICS.iter().filter(|statistic| (statistic.recorded)(self) && !statistic.sparse);
+        let recorded = STATISTICS.iter().filter(|statistic| (statistic.recorded)(self) && statistic.sparse.is_none());
         counts + recorded.map(|statistic| size_of::<f32>() * statistic.stride()).sum::<usize>()
     }
 

@@ -52,7 +52,7 @@ pub struct Sample {
     pub differences: Option<Differences>,
 }
 
-/// The reason for dropping a sample: the part of it that is not finite, or too large to be squared.
+/// The reason for counting a sample as zero: the part of it that is not finite, or too large to be squared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rejected(
     /// Name of that part.
@@ -64,7 +64,7 @@ impl Rejected {
 
     /// The reason with a given name, as read from a file.
     pub fn named(name: &str) -> Self {
-        Self(Self::PARTS.into_iter().find(|part| *part == name).unwrap_or("something in them"))
+        Self(Self::PARTS.into_iter().find(|part| *part == name).unwrap_or("unknown part"))
     }
 }
 

@@ -2,6 +2,7 @@
 //! of a film are driven by it; [`layer`](super::layer) says which images are developed from which statistic.
 
 use super::{BINS, EdgeNeed, Needs, Sample};
+use crate::math::Rgb;
 
 /// Rows of [`STATISTICS`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,8 +28,8 @@ pub(super) struct Statistic {
     pub kind: Kind,
     /// Whether it counts the samples with differences instead of all samples.
     pub of_edges: bool,
-    /// Whether it takes no memory until a sample has a value other than zero.
-    pub sparse: bool,
+    /// If set, the statistic takes no memory in a tile until it says that a sample has a value other than zero.
+    pub sparse: Option<fn(&Sample) -> bool>,
     /// Whether a film with these needs has it.
     pub recorded: fn(Needs) -> bool,
     accumulate: fn(Slot, &Sample),
@@ -37,14 +38,14 @@ pub(super) struct Statistic {
 /// How samples are accumulated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
-    /// Mean of every value, then sum of squared deviations of every value.
+    /// Mean of every value, then sum of the squared deviations from the mean of every value.
     Moments,
     /// Mean of every value in each bin, bin by bin.
     Bins,
 }
 
 const fn moments(values: usize, recorded: fn(Needs) -> bool, accumulate: fn(Slot, &Sample)) -> Statistic {
-    Statistic { values, kind: Kind::Moments, of_edges: false, sparse: false, recorded, accumulate }
+    Statistic { values, kind: Kind::Moments, of_edges: false, sparse: None, recorded, accumulate }
 }
 
 const fn bins(values: usize, recorded: fn(Needs) -> bool, accumulate: fn(Slot, &Sample)) -> Statistic {
@@ -58,7 +59,10 @@ const fn of_edges(statistic: Statistic) -> Statistic {
 /// Every statistic, in the order of [`Record`] and of checkpoint files.
 pub(super) const STATISTICS: [Statistic; 10] = [
     moments(3, |_| true, |slot, sample| slot.add(sample.color.to_array())),
-    Statistic { sparse: true, ..moments(3, |_| true, |slot, sample| slot.add(sample.direct.to_array())) },
+    Statistic {
+        sparse: Some(|sample| sample.direct != Rgb::ZERO),
+        ..moments(3, |_| true, |slot, sample| slot.add(sample.direct.to_array()))
+    },
     moments(7, |needs| needs.features, |slot, sample| slot.add(sample.features.surface())),
     moments(1, |needs| needs.occlusion, |slot, sample| slot.add([sample.features.occlusion])),
     moments(3, |needs| needs.position, |slot, sample| slot.add(sample.features.position.to_array())),
@@ -77,7 +81,7 @@ pub(super) const STATISTICS: [Statistic; 10] = [
     )),
 ];
 
-/// Number of a sample among those of its pixel, as the shares that means are updated with.
+/// Position of a sample among those of its pixel, as the weights that means are updated with.
 #[derive(Clone, Copy)]
 pub(super) struct Ordinal {
     /// One over the number of samples, this one included.
@@ -190,8 +194,12 @@ impl Record {
         (self.statistic().recorded)(needs)
     }
 
-    /// Whether the statistic is not recorded because all of its values are known to be zero.
+    /// Whether the statistic is not recorded because all of its values are known to be zero, in a scene that scatters no
+    /// light. The ambient light is no part of the scene.
     pub fn is_known_zero(self, needs: Needs) -> bool {
+        if self == Self::AmbientEdgeBins {
+            return false;
+        }
         let sampled = Needs { edges: EdgeNeed::Sampled, ..needs };
         needs.edges == EdgeNeed::KnownZero && self.statistic().of_edges && self.is_recorded(sampled)
     }
@@ -224,7 +232,7 @@ mod tests {
         for (k, (record, values)) in names.into_iter().enumerate() {
             assert_eq!((record as usize, record.statistic().values), (k, values));
         }
-        assert!(Record::Direct.statistic().sparse && Record::AmbientEdgeBins.statistic().of_edges);
+        assert!(Record::Direct.statistic().sparse.is_some() && Record::AmbientEdgeBins.statistic().of_edges);
     }
 
     #[test]

@@ -44,7 +44,7 @@ impl Tile {
         self.rejected = take(from, [0, pixels])?;
         for (statistic, plane) in STATISTICS.iter().zip(&mut self.planes) {
             let full = pixels * statistic.stride();
-            let allowed = if statistic.sparse { [0, full] } else { [plane.len(); 2] };
+            let allowed = if statistic.sparse.is_some() { [0, full] } else { [plane.len(); 2] };
             *plane = take(from, allowed)?.into_iter().map(f32::from_bits).collect();
         }
         Ok(())

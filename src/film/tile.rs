@@ -1,8 +1,7 @@
 //! A square of the film: statistics of its pixels.
 
-use super::statistic::{Ordinal, Record, STATISTICS};
+use super::statistic::{Ordinal, STATISTICS};
 use super::{Needs, Rejected, Sample};
-use crate::math::Rgb;
 
 /// Statistics of a tile's pixels, row by row. A tile has one writer at a time, so there are no locks.
 #[derive(Clone, Debug, PartialEq)]
@@ -19,7 +18,7 @@ pub struct Tile {
     pub(super) counts: Vec<u32>,
     /// Samples of every pixel that came with differences; empty when edges are not recorded.
     pub(super) edge_counts: Vec<u32>,
-    /// Samples of every pixel that were not finite; empty as long as there is none.
+    /// Samples of every pixel that were rejected; empty as long as there is none.
     pub(super) rejected: Vec<u32>,
     /// Values of every pixel, one plane for each row of [`STATISTICS`]; empty when it is not recorded, and when it is
     /// sparse and all zero.
@@ -30,7 +29,7 @@ impl Tile {
     pub(super) fn new((x, y): (usize, usize), (width, height): (usize, usize), needs: Needs) -> Self {
         let pixels = width * height;
         let planes = STATISTICS.each_ref().map(|statistic| {
-            let present = (statistic.recorded)(needs) && !statistic.sparse;
+            let present = (statistic.recorded)(needs) && statistic.sparse.is_none();
             vec![0.0; if present { pixels * statistic.stride() } else { 0 }]
         });
         let edge_counts = vec![0; if needs.edges.is_sampled() { pixels } else { 0 }];
@@ -76,14 +75,15 @@ impl Tile {
     }
 
     fn accumulate(&mut self, index: usize, sample: &Sample) {
-        let direct = Record::Direct as usize;
-        if self.planes[direct].is_empty() && sample.direct != Rgb::ZERO {
-            self.planes[direct] = vec![0.0; self.counts.len() * STATISTICS[direct].stride()];
-        }
         let ordinals = [false, true].map(|of_edges| Ordinal::after(self.count_of(of_edges, index)));
         for (statistic, plane) in STATISTICS.iter().zip(&mut self.planes) {
-            let sampled = !statistic.of_edges || sample.differences.is_some();
-            if sampled && !plane.is_empty() {
+            if plane.is_empty() {
+                if !statistic.sparse.is_some_and(|nonzero| nonzero(sample)) {
+                    continue;
+                }
+                plane.resize(self.counts.len() * statistic.stride(), 0.0);
+            }
+            if !statistic.of_edges || sample.differences.is_some() {
                 statistic.add(plane, index, ordinals[usize::from(statistic.of_edges)], sample);
             }
         }

@@ -26,7 +26,7 @@ pub struct Planes {
 
 /// A rectangle of pixels.
 #[derive(Clone, Copy, Debug)]
-pub struct Tile {
+pub struct PlaneTile {
     /// Left column.
     pub x: usize,
     /// Top row.
@@ -37,7 +37,7 @@ pub struct Tile {
     pub height: usize,
 }
 
-impl Tile {
+impl PlaneTile {
     /// Columns and rows, within the tile, where blocks of [`LANES`] pixels begin, row by row.
     #[inline(always)]
     pub fn blocks(self) -> impl Iterator<Item = (usize, usize)> {
@@ -83,10 +83,15 @@ impl Planes {
     }
 
     /// Planes whose tiles are computed in parallel: `compute` returns a tile's channels one after the other.
-    pub fn from_tiles(width: usize, height: usize, channels: usize, compute: impl Fn(Tile) -> Vec<f32> + Sync) -> Self {
+    pub fn from_tiles(
+        width: usize,
+        height: usize,
+        channels: usize,
+        compute: impl Fn(PlaneTile) -> Vec<f32> + Sync,
+    ) -> Self {
         let mut planes = Self::new(width, height, channels);
         for y in (0..height).step_by(TILE) {
-            let tile = |x| Tile { x, y, width: TILE.min(width - x), height: TILE.min(height - y) };
+            let tile = |x| PlaneTile { x, y, width: TILE.min(width - x), height: TILE.min(height - y) };
             let lefts: Vec<_> = (0..width).step_by(TILE).collect();
             let tiles: Vec<_> = lefts.into_par_iter().map(|x| (tile(x), compute(tile(x)))).collect();
             for (tile, values) in tiles {

@@ -4,7 +4,7 @@ use super::inputs::Inputs;
 use crate::error::Result;
 use crate::film::Layer;
 use crate::image::nl_means::Guide;
-use crate::image::planes::{Planes, Tile};
+use crate::image::planes::{PlaneTile, Planes};
 use crate::math::lanes::Lanes;
 
 /// A feature of three channels.
@@ -74,7 +74,7 @@ impl Feature {
 }
 
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-fn clean_tile(mean: &Planes, noise: &Planes, tile: Tile) -> Vec<f32> {
+fn clean_tile(mean: &Planes, noise: &Planes, tile: PlaneTile) -> Vec<f32> {
     let mut out = vec![0.0; 4 * tile.width * tile.height];
     for (x, y) in tile.blocks() {
         let at = ((tile.x + x) as isize, (tile.y + y) as isize);

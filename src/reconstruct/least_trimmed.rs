@@ -8,7 +8,7 @@ use super::inputs::{Inputs, check_memory, quads};
 use super::{Context, Method, Parameter, Parameters, Reconstruction, Solution, Traits};
 use crate::error::Result;
 use crate::film::{EdgeParts, Edges, Frame, Layer, Needs};
-use crate::image::nl_means::{self, Guide, Guides, Settings};
+use crate::image::nl_means::{self, Guide, Guides, NlmSettings};
 use crate::image::planes::{Planes, mirror};
 use crate::solve::graph::Quad;
 use crate::solve::irls;
@@ -113,7 +113,7 @@ impl LeastTrimmed {
             .fold(color.clone(), |values, &offset| values.and(&difference_planes(inputs, edges, offset)));
         let color = Guide { mean: color, variance: variance.sum(), tolerance: None };
         let guides = Guides { color, features: Vec::new() };
-        let settings = Settings { window: self.window, patch: PATCH, color: TOLERANCE, feature: None };
+        let settings = NlmSettings { window: self.window, patch: PATCH, color: TOLERANCE, feature: None };
         let filtered = nl_means::filter(&values, &guides, settings);
         let of_kind: Vec<_> = (0..edges.offsets().len()).map(|kind| quads(&filtered, 3 + 3 * kind)).collect();
         let differences = (0..edges.len()).map(|edge| of_kind[edges.kind(edge)][edges.ends(edge)[0]]);

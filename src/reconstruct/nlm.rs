@@ -6,7 +6,7 @@ use super::inputs::{Inputs, check_memory};
 use super::{Context, Method, Parameter, Parameters, Reconstruction, Solution, Traits};
 use crate::error::Result;
 use crate::film::{Frame, Needs};
-use crate::image::nl_means::{self, Guides, Settings};
+use crate::image::nl_means::{self, Guides, NlmSettings};
 
 /// `nlm`.
 pub const METHOD: Method = Method {
@@ -35,7 +35,7 @@ const FEATURE: f32 = 0.6;
 fn make(parameters: &Parameters) -> Result<Box<dyn Reconstruction>> {
     Ok(Box::new(Nlm {
         features: parameters.switch("features")?,
-        settings: Settings {
+        settings: NlmSettings {
             window: parameters.get("window", "a number from 1 to 12", |window| (1..=12).contains(window))?,
             patch: parameters.get("patch", "a number from 0 to 4", |patch| (0..=4).contains(patch))?,
             color: parameters.get("k", "a number in [0.01, 100]", |k| (0.01..=100.0).contains(k))?,
@@ -46,7 +46,7 @@ fn make(parameters: &Parameters) -> Result<Box<dyn Reconstruction>> {
 
 struct Nlm {
     features: bool,
-    settings: Settings,
+    settings: NlmSettings,
 }
 
 impl Reconstruction for Nlm {
@@ -63,7 +63,7 @@ impl Reconstruction for Nlm {
                 features.push(Feature::of(kind, &inputs)?.guide());
             }
         }
-        let settings = Settings { feature: self.features.then_some(FEATURE), ..self.settings };
+        let settings = NlmSettings { feature: self.features.then_some(FEATURE), ..self.settings };
         let guides = Guides { color: inputs.guide()?, features };
         let filtered = nl_means::filter(&guides.color.mean, &guides, settings);
         let image = filtered.to_image(frame.width, frame.height, 1.0 / inputs.scale);

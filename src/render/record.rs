@@ -88,7 +88,7 @@ impl PathRecord {
         }
     }
 
-    /// Adds the light of next-event estimation at some vertices.
+    /// Adds the direct light of some vertices, from next-event estimation, to the colour.
     pub fn add_direct(&mut self, depth: u32, vertices: &Vertices, shaded: &Shaded) {
         for lane in vertices.lit.lanes() {
             let id = vertices.id.0[lane] as usize;
@@ -117,7 +117,7 @@ impl PathRecord {
 
 /// Records the emitter that a path has hit with the vertex that it was scattered from.
 fn keep_emission(scene: &Scene, parent: &mut Vertices, lane: usize, hit: EmitterHit) {
-    parent.emits.set(lane, true);
+    parent.hits_emitter.set(lane, true);
     let Emission { points, radiance, light_pdf } = &mut parent.emission;
     scene.keep_light(points, lane, hit.point, (hit.radiance, hit.light_pdf));
     radiance.set(lane, hit.radiance);

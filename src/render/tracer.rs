@@ -110,7 +110,7 @@ fn arrive(
     if describes(needs) {
         record.describe(scene, depth, packet, (vertices, active, hit));
     }
-    vertices.emits = Mask::NONE;
+    vertices.hits_emitter = Mask::NONE;
     if depth + 1 >= max_depth {
         vertices.hit = Mask::NONE;
         return;

@@ -28,8 +28,8 @@ pub struct Vertices {
     pub survival: Lanes,
     /// Indices of the next vertices.
     pub next: Bits,
-    /// Lanes whose next segment ends on an emitter.
-    pub emits: Mask,
+    /// Lanes whose next segment hits an emitter.
+    pub hits_emitter: Mask,
     /// Emitters at the ends of these segments.
     pub emission: Emission,
 }
@@ -76,7 +76,7 @@ impl Default for Vertices {
             scatters: Scatters::default(),
             survival: zero,
             next: Bits::ZERO,
-            emits: Mask::NONE,
+            hits_emitter: Mask::NONE,
             emission: Emission { points, radiance: zero3, light_pdf: zero },
         }
     }

@@ -24,7 +24,7 @@ const STEPS: usize = 200;
 /// residual can be brought down to a share of its first one.
 const PATIENCE: u32 = 12;
 
-struct Level {
+struct GridLevel {
     graph: Graph,
     /// Node of the next level that stands for each node.
     joined: Vec<u32>,
@@ -34,7 +34,7 @@ struct Level {
 
 /// A graph with its coarser versions.
 pub struct Multigrid {
-    levels: Vec<Level>,
+    levels: Vec<GridLevel>,
     coarsest: Graph,
     /// Cholesky factor of the coarsest matrix, row by row; none when that has too many nodes, which only happens
     /// when no two of them belong together.
@@ -76,7 +76,7 @@ impl Multigrid {
                 let free = slots.iter().position(|&slot| slot == ALONE).unwrap_or(MEMBERS - 1);
                 slots[free] = i as u32;
             }
-            levels.push(Level { graph: finest, joined, members });
+            levels.push(GridLevel { graph: finest, joined, members });
             finest = coarse;
         }
         let factor = (finest.len() <= DIRECT).then(|| cholesky(&finest));

@@ -168,6 +168,56 @@ fn mistakes_are_told_apart_and_leave_nothing_behind() {
 }
 
 #[test]
+fn data_errors_are_no_mistakes_on_the_command_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut frame = fluxion::synthetic::exact(&fluxion::synthetic::picture((9, 7)));
+    fluxion::synthetic::change(&mut frame, fluxion::Layer::Dx, |i, value| if i == 4 { f32::NAN } else { value });
+    fluxion::exr::save(&folder.path().join("nan.exr"), &frame).unwrap();
+    for (name, size) in [("small.exr", (9, 7)), ("large.exr", (9, 8))] {
+        let image = fluxion::synthetic::picture(size);
+        fluxion::write_color(&folder.path().join(name), &image, &[], &[]).unwrap();
+    }
+    for (arguments, expected) in [
+        (vec!["reconstruct", "nan.exr", "-o", "a.exr", "--method", "l2"], "dx.G is not finite at pixel 1,0"),
+        (vec!["compare", "small.exr", "large.exr"], "differ in shape"),
+        (vec!["reconstruct", "small.exr", "-o", "a.exr", "--method", "control_variate:weights=given"], "missing"),
+    ] {
+        let (code, text) = stderr(fluxion(folder.path()).args(&arguments));
+        assert!(code == 1 && text.contains(expected), "{arguments:?}: {code} {text}");
+    }
+}
+
+#[test]
+fn every_image_says_where_it_comes_from() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |arguments: &[&str]| fluxion(folder.path()).args(arguments).assert().success();
+    let cornell = scene("cornell-box");
+    let render = ["render", &cornell, "--size", "16x12", "--spp", "8", "--seed", "4", "-q"];
+    let saved = ["-o", "a.exr", "--layers", "layers.exr", "--checkpoint", "a.ckpt"];
+    run(&[&render[..], &saved[..]].concat());
+    for from in ["layers.exr", "a.ckpt"] {
+        run(&["reconstruct", from, "-o", &format!("{from}.exr"), "--method", "l1"]);
+    }
+    let headers = |name: &str| {
+        let names = fluxion::film::Provenance::NAMES;
+        let pixels = fluxion::image::io::read(&folder.path().join(name), &names).unwrap();
+        fluxion::film::Provenance::from_attributes(&pixels.attributes)
+    };
+    let rendered = headers("a.exr");
+    assert_eq!((rendered.method.as_str(), rendered.seed.as_str(), rendered.spp.as_str()), ("frgr", "4", "8"));
+    assert!(
+        rendered.plan.starts_with("+gradients") && rendered.fingerprint.len() == 16 && rendered.scene == "scene.xml"
+    );
+    for name in ["layers.exr.exr", "a.ckpt.exr"] {
+        let found = headers(name);
+        // Times are those of the render, which is measured after the checkpoint has been written.
+        let expected =
+            fluxion::film::Provenance { method: "l1".into(), seconds: found.seconds.clone(), ..rendered.clone() };
+        assert_eq!(found, expected, "{name}");
+    }
+}
+
+#[test]
 fn a_missing_layer_is_named_with_the_flag_that_renders_it() {
     let folder = tempfile::tempdir().unwrap();
     let arguments = ["-o", "a.exr", "--size", "8x8", "--spp", "1", "--layers", "l.exr", "--method", "primal"];

@@ -9,6 +9,7 @@ mod cli;
 mod common;
 mod comparators;
 mod corrupt;
+mod edges;
 mod film;
 mod frgr;
 mod gradient;

@@ -1,6 +1,6 @@
 //! How far pixels and patches are apart, in units of their noise.
 
-use crate::image::planes::{Planes, Tile};
+use crate::image::planes::{PlaneTile, Planes};
 use crate::math::lanes::{LANES, Lanes};
 
 /// Images of a few channels with the sums of their variances and of their tolerances.
@@ -57,7 +57,7 @@ impl Guide {
 
 /// Distances of a tile's pixels and their surroundings to others, summed along rows.
 pub struct Patches {
-    tile: Tile,
+    tile: PlaneTile,
     reach: usize,
     distance: Vec<f32>,
     /// Sums along rows for each radius.
@@ -66,7 +66,7 @@ pub struct Patches {
 
 impl Patches {
     /// Memory for patches of the given number of radii, the largest `reach`.
-    pub fn new(tile: Tile, reach: usize, radii: usize) -> Self {
+    pub fn new(tile: PlaneTile, reach: usize, radii: usize) -> Self {
         let rows = tile.height + 2 * reach;
         let width = tile.width.next_multiple_of(LANES);
         // A vector more than the patches need, and one to read beyond it.

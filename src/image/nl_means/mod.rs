@@ -6,7 +6,7 @@ pub mod rdfc;
 
 pub use self::distance::Guide;
 use self::distance::{Other, Patches};
-use super::planes::{Planes, Tile};
+use super::planes::{PlaneTile, Planes};
 use crate::math::lanes::{LANES, Lanes};
 
 /// Guides that pixels are compared by: colours over patches, and features, of which the largest distance counts.
@@ -37,7 +37,7 @@ impl Guides {
 
 /// How alike pixels must be.
 #[derive(Clone, Copy)]
-pub struct Settings {
+pub struct NlmSettings {
     /// Radius of the window of pixels that are averaged.
     pub window: usize,
     /// Radius of the patches that are compared.
@@ -49,7 +49,7 @@ pub struct Settings {
 }
 
 /// Averages the planes of `values`. The window and a patch must fit in the border.
-pub fn filter(values: &Planes, guides: &Guides, settings: Settings) -> Planes {
+pub fn filter(values: &Planes, guides: &Guides, settings: NlmSettings) -> Planes {
     Planes::from_tiles(values.width, values.height, values.channels(), |tile| {
         filter_tile(values, guides, settings, tile)
     })
@@ -59,14 +59,14 @@ pub fn filter(values: &Planes, guides: &Guides, settings: Settings) -> Planes {
 pub fn clean(noisy: &Guide, tolerance: f32) -> Planes {
     let Guide { mean, variance, tolerance: limit } = noisy;
     let color = Guide { mean: mean.clone(), variance: variance.clone(), tolerance: limit.clone() };
-    let settings = Settings { window: 5, patch: 3, color: tolerance, feature: None };
+    let settings = NlmSettings { window: 5, patch: 3, color: tolerance, feature: None };
     filter(mean, &Guides { color, features: Vec::new() }, settings)
 }
 
 /// Weights of a tile's pixels for those of their windows, centres included, by colour alone. For each of the tile's
 /// blocks the offsets follow each other, row by row, with a weight for every pixel. Those outside the image have none.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-pub fn weights(guide: &Guide, settings: Settings, tile: Tile) -> Vec<f32> {
+pub fn weights(guide: &Guide, settings: NlmSettings, tile: PlaneTile) -> Vec<f32> {
     let offsets = (2 * settings.window + 1).pow(2);
     let mut weights = vec![0.0; offsets * tile.height * tile.width.next_multiple_of(LANES)];
     let mut patches = Patches::new(tile, settings.patch, 1);
@@ -102,7 +102,7 @@ fn offsets(radius: usize) -> impl Iterator<Item = (isize, isize)> {
 }
 
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-fn filter_tile(values: &Planes, guides: &Guides, settings: Settings, tile: Tile) -> Vec<f32> {
+fn filter_tile(values: &Planes, guides: &Guides, settings: NlmSettings, tile: PlaneTile) -> Vec<f32> {
     let width = tile.width.next_multiple_of(LANES);
     let channels = values.channels();
     let mut patches = Patches::new(tile, settings.patch, 1);

@@ -2,8 +2,8 @@
 //! sensitivity, of which each pixel takes the one with the least estimated error.
 
 use super::distance::{Other, Patches};
-use super::{Guide, Guides, Settings, filter, offsets};
-use crate::image::planes::{Planes, Tile};
+use super::{Guide, Guides, NlmSettings, filter, offsets};
+use crate::image::planes::{PlaneTile, Planes};
 use crate::math::lanes::{LANES, Lanes};
 
 /// Colour distances of the three filters: two patch sizes, and no colours at all.
@@ -62,7 +62,7 @@ fn denoise_band(guides: &Guides, options: Options) -> Denoised {
     let candidates = Planes::from_tiles(width, height, 3 * 5, |tile| denoise_tile(guides, tile, options));
     let errors = candidates.part(9, 3);
     let smooth = options.choice > 0;
-    let of_errors = Settings { window: 1, patch: 3, color: 1.0, feature: None };
+    let of_errors = NlmSettings { window: 1, patch: 3, color: 1.0, feature: None };
     let errors = if smooth { filter(&errors, guides, of_errors) } else { errors };
     let best = |x: isize, y: isize| {
         let slope = |k: usize| candidates.at(12 + k, x, y);
@@ -72,7 +72,7 @@ fn denoise_band(guides: &Guides, options: Options) -> Denoised {
     let mut choice =
         Planes::from_fn(width, height, 3, |k, x, y| f32::from(u8::from(best(x as isize, y as isize) == k)));
     if smooth {
-        let of_choice = Settings { window: options.choice, patch: 1, color: 0.5, feature: Some(FEATURE_TOLERANCE) };
+        let of_choice = NlmSettings { window: options.choice, patch: 1, color: 0.5, feature: Some(FEATURE_TOLERANCE) };
         choice = filter(&choice, guides, of_choice);
     }
     let blend = |from: &Planes, first: usize, step: usize, x: usize, y: usize| {
@@ -153,7 +153,7 @@ fn alike(patches: &Patches, k: usize, x: usize, y: usize) -> Lanes {
 
 /// Nine planes of filtered colours, three of errors, three of slopes.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-fn denoise_tile(guides: &Guides, tile: Tile, options: Options) -> Vec<f32> {
+fn denoise_tile(guides: &Guides, tile: PlaneTile, options: Options) -> Vec<f32> {
     let width = tile.width.next_multiple_of(LANES);
     let mut sums = vec![[EMPTY; 3]; tile.height * width / LANES];
     if options.symmetric {
@@ -165,7 +165,7 @@ fn denoise_tile(guides: &Guides, tile: Tile, options: Options) -> Vec<f32> {
 }
 
 #[inline(always)]
-fn add_pixels(guides: &Guides, tile: Tile, window: usize, sums: &mut [[Sums; 3]]) {
+fn add_pixels(guides: &Guides, tile: PlaneTile, window: usize, sums: &mut [[Sums; 3]]) {
     let mut patches = Patches::new(tile, PATCHES[1], 2);
     for (dx, dy) in offsets(window) {
         let other = Other::At(dx, dy);
@@ -186,7 +186,7 @@ fn add_pixels(guides: &Guides, tile: Tile, window: usize, sums: &mut [[Sums; 3]]
 /// Like [`add_pixels`]; but where the mean of two opposite pixels is more like the centre than they are together,
 /// as on a ramp, both get its weight. Pixels that are far off, each for itself, stay out.
 #[inline(always)]
-fn add_pairs(guides: &Guides, tile: Tile, window: usize, sums: &mut [[Sums; 3]]) {
+fn add_pairs(guides: &Guides, tile: PlaneTile, window: usize, sums: &mut [[Sums; 3]]) {
     const FAR: f32 = 25.0;
     let mut patches: [Patches; 3] = std::array::from_fn(|_| Patches::new(tile, PATCHES[1], 2));
     for (dx, dy) in offsets(window).filter(|&(dx, dy)| dy > 0 || (dy == 0 && dx > 0)) {
@@ -216,7 +216,7 @@ fn add_pairs(guides: &Guides, tile: Tile, window: usize, sums: &mut [[Sums; 3]])
 
 /// Results from the sums, the centre included.
 #[inline(always)]
-fn finish(guides: &Guides, tile: Tile, sums: &[[Sums; 3]]) -> Vec<f32> {
+fn finish(guides: &Guides, tile: PlaneTile, sums: &[[Sums; 3]]) -> Vec<f32> {
     let color = &guides.color;
     let mut out = vec![0.0; 15 * tile.width * tile.height];
     for ((x, y), sums) in tile.blocks().zip(sums) {

@@ -13,13 +13,13 @@ mod windows;
 use self::blocks::Blocks;
 use self::design::ORDER;
 use self::predict::{Candidates, LEVERAGE};
-use self::windows::Problem;
+use self::windows::Regression;
 use super::generated::{self, Options};
 use super::inputs::{FLOOR, Inputs, check_memory, floor_variance};
 use super::{Context, EdgeTrust, Method, Parameter, Parameters, Reconstruction, Solution, Traits};
 use crate::error::Result;
 use crate::film::{Frame, Layer, Needs};
-use crate::image::nl_means::{self, Guide, Guides, Settings};
+use crate::image::nl_means::{self, Guide, Guides, NlmSettings};
 use crate::image::planes::Planes;
 
 /// `apr`.
@@ -153,7 +153,7 @@ impl Reconstruction for Apr {
             let inside = x < size.0 && y < size.1;
             if inside { 1.0 / (smooth.at(0, x as isize, y as isize) + LEAST) } else { 0.0 }
         });
-        let problem = Problem { features: &features, color: &Blocks::new(&color), weight: &weight };
+        let problem = Regression { features: &features, color: &Blocks::new(&color), weight: &weight };
         (context.progress)("fit", 0.0);
         let fits: Vec<_> = self.radii.iter().map(|&radius| problem.fit(radius)).collect();
         let candidates = Candidates { problem: &problem, fits: &fits, orders: self.orders };
@@ -247,7 +247,7 @@ impl Blend {
         let known = self.own.zip(&self.leverage, |own, leverage| own * (1.0 - 2.0 * leverage));
         let error = square.zip(&known, |square, known| square - known);
         let color = Guide { mean: self.color.clone(), variance: floor_variance(&self.own, FLOOR), tolerance: None };
-        let settings = Settings { window: 8, patch: 3, color: 1.0, feature: None };
+        let settings = NlmSettings { window: 8, patch: 3, color: 1.0, feature: None };
         let smooth = nl_means::filter(&error.and(&self.own), &Guides { color, features: Vec::new() }, settings);
         [smooth.part(0, 1), smooth.part(1, 1)]
     }

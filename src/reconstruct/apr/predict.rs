@@ -4,7 +4,7 @@
 use super::blocks::{Blocks, centre};
 use super::design::{ORDER, columns, design};
 use super::fit::{Fit, entry};
-use super::windows::Problem;
+use super::windows::Regression;
 use crate::math::lanes::Lanes;
 
 /// Radius, in blocks, of the windows' centres that predict a block.
@@ -25,7 +25,7 @@ pub const LEVERAGE: usize = 3;
 /// Fits to choose from.
 pub struct Candidates<'a> {
     /// The regression problem.
-    pub problem: &'a Problem<'a>,
+    pub problem: &'a Regression<'a>,
     /// Fits of the windows of every block, for windows of different sizes.
     pub fits: &'a [Vec<Fit>],
     /// The lowest and the highest order that are used.
@@ -42,7 +42,7 @@ impl Candidates<'_> {
 
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
 fn block(candidates: &Candidates, pilot: Option<&Blocks>, (x, y): (usize, usize)) -> [Lanes; CHANNELS] {
-    let Problem { features, color, weight } = candidates.problem;
+    let Regression { features, color, weight } = candidates.problem;
     let here = features.at(x, y);
     let (lowest, highest) = candidates.orders;
     let target = pilot.unwrap_or(color).at(x, y);

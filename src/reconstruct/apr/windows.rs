@@ -12,7 +12,7 @@ use crate::math::lanes::Lanes;
 const TILE: usize = 16;
 
 /// A regression problem: colours, features and weights of all blocks.
-pub struct Problem<'a> {
+pub struct Regression<'a> {
     /// Features that the colour is a linear function of, besides the position.
     pub features: &'a Blocks,
     /// Three channels.
@@ -35,7 +35,7 @@ impl Range {
     }
 }
 
-impl Problem<'_> {
+impl Regression<'_> {
     /// Fits the windows that reach `radius` blocks to each side of every block, row by row.
     pub fn fit(&self, radius: usize) -> Vec<Fit> {
         let (columns, rows) = (self.color.columns, self.color.rows);

@@ -7,7 +7,7 @@
 
 use std::borrow::Cow;
 
-use crate::image::planes::{Planes, Tile};
+use crate::image::planes::{PlaneTile, Planes};
 use crate::math::lanes::Lanes;
 use crate::solve::simplex::{RANK, nearest};
 
@@ -50,7 +50,7 @@ impl std::str::FromStr for Solver {
 }
 
 /// A filter's inputs.
-pub struct Problem<'a> {
+pub struct FilterProblem<'a> {
     /// The sampled colour.
     pub color: &'a Planes,
     /// Its variance.
@@ -65,7 +65,7 @@ pub struct Problem<'a> {
     pub solver: Solver,
 }
 
-impl Problem<'_> {
+impl FilterProblem<'_> {
     /// The filtered colour and its variance.
     pub fn solve(&self) -> [Planes; 2] {
         let planes = Planes::from_tiles(self.color.width, self.color.height, 6, |tile| match self.solver {
@@ -83,7 +83,7 @@ impl Problem<'_> {
     }
 }
 
-fn exact_tile(problem: &Problem, tile: Tile) -> Vec<f32> {
+fn exact_tile(problem: &FilterProblem, tile: PlaneTile) -> Vec<f32> {
     let pixels = tile.width * tile.height;
     let mut out = vec![0.0; 6 * pixels];
     let size = (2 * problem.radius + 1).pow(2);
@@ -114,7 +114,7 @@ fn exact_tile(problem: &Problem, tile: Tile) -> Vec<f32> {
 }
 
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-fn sweep_tile(problem: &Problem, tile: Tile) -> Vec<f32> {
+fn sweep_tile(problem: &FilterProblem, tile: PlaneTile) -> Vec<f32> {
     let mut out = vec![0.0; 6 * tile.width * tile.height];
     let mut weights = vec![Lanes::ZERO; (2 * problem.radius + 1).pow(2)];
     for (x, y) in tile.blocks() {
@@ -135,7 +135,7 @@ fn sweep_tile(problem: &Problem, tile: Tile) -> Vec<f32> {
 /// The sweeps of [`LANES`] pixels. A step from weights w towards pixel q changes Σ w u and Σ v w² only along u_q and
 /// v_q w_q, so it takes as many operations as there are terms, whatever the size of the window.
 struct Sweeps<'a, const T: usize> {
-    problem: &'a Problem<'a>,
+    problem: &'a FilterProblem<'a>,
     at: (isize, isize),
     targets: [[Lanes; 3]; T],
     roots: [Lanes; T],
@@ -149,7 +149,7 @@ struct Sweeps<'a, const T: usize> {
 
 impl<'a, const T: usize> Sweeps<'a, T> {
     #[inline(always)]
-    fn new(problem: &'a Problem, at: (isize, isize), weights: &'a mut [Lanes]) -> Self {
+    fn new(problem: &'a FilterProblem, at: (isize, isize), weights: &'a mut [Lanes]) -> Self {
         let target = |t: usize, c: usize| problem.terms[t].target.lanes(c, at.0, at.1);
         let targets = std::array::from_fn(|t| [target(t, 0), target(t, 1), target(t, 2)]);
         let roots = std::array::from_fn(|t| Lanes::splat(problem.terms[t].weight.sqrt()));

@@ -21,7 +21,7 @@ mod resample;
 use std::borrow::Cow;
 
 use self::enhance::{Enhanced, enhance};
-use self::filter::{Problem, Solver, Term};
+use self::filter::{FilterProblem, Solver, Term};
 use self::form::Form;
 use self::level::Level;
 use self::resample::Resampling;
@@ -264,7 +264,7 @@ impl Frgr {
             }
         }
         let (color, variance) = (&level.color, &level.variance);
-        Problem { color, variance, penalty: &penalty, terms, radius: self.radius, solver: self.solver }.solve()
+        FilterProblem { color, variance, penalty: &penalty, terms, radius: self.radius, solver: self.solver }.solve()
     }
 }
 

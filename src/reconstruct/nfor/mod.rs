@@ -11,7 +11,7 @@ use super::inputs::{FLOOR, Inputs, check_memory, floor_variance};
 use super::{Context, Method, Parameter, Parameters, Reconstruction, Solution, Traits};
 use crate::error::Result;
 use crate::film::{Frame, Layer, Needs};
-use crate::image::nl_means::{self, Guide, Guides, Settings};
+use crate::image::nl_means::{self, Guide, Guides, NlmSettings};
 use crate::image::planes::Planes;
 
 /// `nfor`.
@@ -72,7 +72,7 @@ impl Reconstruction for Nfor {
             nl_means::filter(
                 planes,
                 &guide,
-                Settings { window: regression::WINDOW, patch: 1, color: 1.0, feature: None },
+                NlmSettings { window: regression::WINDOW, patch: 1, color: 1.0, feature: None },
             )
         };
         let errors = [0, 1].map(|t: usize| smooth(&error(&halves, &candidates[t], &own)));

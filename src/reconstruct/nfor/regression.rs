@@ -3,8 +3,8 @@
 
 use rayon::prelude::*;
 
-use crate::image::nl_means::{self, Guide, Settings};
-use crate::image::planes::{Planes, TILE, Tile};
+use crate::image::nl_means::{self, Guide, NlmSettings};
+use crate::image::planes::{PlaneTile, Planes, TILE};
 use crate::math::lanes::{LANES, Lanes};
 
 /// Features.
@@ -28,10 +28,10 @@ const RIDGE: f32 = 1e-5;
 /// Fits `color` by `features`; pixels count by how alike they are in `guide`, up to `tolerance` standard deviations.
 pub fn regress(color: &Planes, features: &Planes, guide: &Guide, tolerance: f32) -> Planes {
     let (width, height) = (color.width, color.height);
-    let settings = Settings { window: WINDOW, patch: PATCH, color: tolerance, feature: None };
+    let settings = NlmSettings { window: WINDOW, patch: PATCH, color: tolerance, feature: None };
     let mut sums = vec![0.0; 4 * width * height];
     for y in (0..height).step_by(TILE) {
-        let tile = |x| Tile { x, y, width: TILE.min(width - x), height: TILE.min(height - y) };
+        let tile = |x| PlaneTile { x, y, width: TILE.min(width - x), height: TILE.min(height - y) };
         let lefts: Vec<_> = (0..width).step_by(TILE).collect();
         let fits = lefts.into_par_iter().map(|x| {
             let tile = tile(x);
@@ -50,12 +50,12 @@ pub fn regress(color: &Planes, features: &Planes, guide: &Guide, tolerance: f32)
 }
 
 /// Floats in a row and rows of a tile with the windows around it.
-fn reach(tile: Tile) -> (usize, usize) {
+fn reach(tile: PlaneTile) -> (usize, usize) {
     (tile.width.next_multiple_of(LANES) + 2 * WINDOW, tile.height + 2 * WINDOW)
 }
 
 /// Adds a tile's sums to those of the image, the part that is inside.
-fn add(sums: &mut [f32], (width, height): (usize, usize), fits: &[f32], tile: Tile) {
+fn add(sums: &mut [f32], (width, height): (usize, usize), fits: &[f32], tile: PlaneTile) {
     let (stride, rows) = reach(tile);
     let columns = WINDOW.saturating_sub(tile.x)..(tile.width + 2 * WINDOW).min(width + WINDOW - tile.x);
     for (i, row) in fits.chunks_exact(stride).enumerate() {
@@ -83,7 +83,7 @@ fn columns(features: &Planes, centre: &[Lanes; FEATURES], q: (isize, isize), ste
 
 /// Weighted sums of the fitted colours and of the weights, over a tile and the windows' margin around it.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-fn fit_tile(color: &Planes, features: &Planes, weights: &[f32], tile: Tile) -> Vec<f32> {
+fn fit_tile(color: &Planes, features: &Planes, weights: &[f32], tile: PlaneTile) -> Vec<f32> {
     let r = WINDOW as isize;
     let (stride, rows) = reach(tile);
     let mut out = vec![0.0; 4 * stride * rows];

@@ -33,7 +33,7 @@ pub struct ShiftKind {
 /// Every shift mapping, the default first.
 pub const SHIFTS: &[ShiftKind] = &[reconnect::SHIFT, replay::SHIFT];
 
-/// Roughness above which a smooth lobe counts as diffuse, unless given.
+/// Default threshold: a material whose smooth lobes are all rougher counts as diffuse.
 const THRESHOLD: f32 = 0.001;
 
 /// A shift mapping with its parameter.
@@ -42,7 +42,7 @@ const THRESHOLD: f32 = 0.001;
 pub struct Shift {
     /// Position in [`SHIFTS`].
     kind: usize,
-    /// Roughness above which a smooth lobe counts as diffuse.
+    /// A material whose smooth lobes are all rougher counts as diffuse.
     threshold: f32,
 }
 

@@ -28,14 +28,14 @@ impl ShiftMapping for Replay {
 
     fn shift(&mut self, tracer: &mut PathTracer, camera: &CameraSamples, record: &mut PathRecord) {
         record.samples.iter_mut().for_each(|sample| sample.differences = Some(Differences::default()));
-        for (edge, step) in CROSS.into_iter().enumerate() {
+        for (direction, step) in CROSS.into_iter().enumerate() {
             tracer.trace(camera, vec2(step.0 as f32, step.1 as f32), false, &mut self.neighbours);
             let samples = record.samples.iter_mut().zip(&self.neighbours.samples).zip(camera.pixels);
             for ((sample, neighbour), &pixel) in samples {
                 let Some(differences) = &mut sample.differences else { continue };
                 if camera.neighbour(pixel, step).is_some() {
-                    differences.color[edge] = 0.5 * (neighbour.color - sample.color);
-                    differences.ambient[edge] = 0.5 * (neighbour.ambient - sample.ambient);
+                    differences.color[direction] = 0.5 * (neighbour.color - sample.color);
+                    differences.ambient[direction] = 0.5 * (neighbour.ambient - sample.ambient);
                 }
             }
         }

@@ -15,21 +15,21 @@ pub const PLUGIN: Plugin<Arc<dyn Bsdf>> = Plugin { name: "mask", parameters: "op
 
 fn make(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Bsdf>> {
     let opacity = loader.texture(object, "opacity", Rgb::splat(0.5))?;
-    Ok(Arc::new(Mask { opacity, nested: loader.nested_bsdf(object)? }))
+    Ok(Arc::new(Masked { opacity, nested: loader.nested_bsdf(object)? }))
 }
 
-struct Mask {
+struct Masked {
     opacity: Arc<dyn Texture>,
     nested: Arc<dyn Bsdf>,
 }
 
-impl Mask {
+impl Masked {
     fn opacity(&self, surface: &Surface) -> f32 {
         self.opacity.scalar(&surface.at).clamp(0.0, 1.0)
     }
 }
 
-impl Bsdf for Mask {
+impl Bsdf for Masked {
     fn sample(&self, surface: &Surface, wi: Vec3, lobe: f32, u: Vec2) -> Option<BsdfSample> {
         let opacity = self.opacity(surface);
         if lobe < opacity {

@@ -6,7 +6,7 @@ use crate::scene::load::props::{Object, Value};
 
 /// A window of the full film.
 #[derive(Clone, Copy, Debug)]
-pub struct Film {
+pub struct FilmWindow {
     /// Pixels of the window.
     pub size: (usize, usize),
     /// The window's upper left corner, as a share of the full film.
@@ -15,13 +15,13 @@ pub struct Film {
     pub extent: Vec2,
 }
 
-impl Default for Film {
+impl Default for FilmWindow {
     fn default() -> Self {
         Self { size: (768, 576), origin: Vec2::ZERO, extent: Vec2::ONE }
     }
 }
 
-impl Film {
+impl FilmWindow {
     /// Size and crop window. The output's format is the command line's to say, and pixels are means over their
     /// squares: gradients between pixels are only defined for the box filter.
     pub fn load(object: &Object) -> Result<Self> {

@@ -2,7 +2,7 @@
 
 mod film;
 
-use self::film::Film;
+use self::film::FilmWindow;
 use crate::error::Result;
 use crate::math::lanes::{Lanes, Lanes3};
 use crate::math::{Mat4, Vec2, Vec3, Vec4, vec2};
@@ -20,7 +20,7 @@ pub struct Sensor {
     pub height: usize,
     /// Samples per pixel that the file suggests.
     pub spp: u32,
-    film: Film,
+    film: FilmWindow,
     to_world: Mat4,
     /// Half the full film's extent, at distance one where the view widens.
     half_extent: Vec2,
@@ -97,13 +97,13 @@ pub fn load(object: &Object, loader: &mut Loader, size: Option<(usize, usize)>, 
     Ok(sensor)
 }
 
-fn film_and_spp(object: &Object, loader: &Loader) -> Result<(Film, u32)> {
-    let (mut film, mut spp) = (Film::default(), 64);
+fn film_and_spp(object: &Object, loader: &Loader) -> Result<(FilmWindow, u32)> {
+    let (mut film, mut spp) = (FilmWindow::default(), 64);
     for property in object.nested() {
         let nested = loader.resolve(property)?;
         property.take();
         match nested.class.as_str() {
-            "film" => film = Film::load(&nested)?,
+            "film" => film = FilmWindow::load(&nested)?,
             "sampler" => {
                 spp = nested.integer("sample_count", 64)?;
                 // Sample patterns are ours.

@@ -1,7 +1,7 @@
 //! Connecting offsets to the next vertex of their base paths. Jacobians are in solid angle at the vertex that is left, so
 //! that they are the ratio of the solid angles under which the two paths see the same piece of surface.
 
-use super::difference::OffsetEnds;
+use super::difference::LastSegments;
 use super::offsets::SurfacePacket;
 use crate::math::lanes::{Lanes, Lanes3, Mask};
 use crate::scene::Scene;
@@ -55,7 +55,7 @@ pub fn jacobian(base: Lanes3, offset: Lanes3, (p, n): (Lanes3, Lanes3)) -> Lanes
     solid_angle(offset) / solid_angle(base)
 }
 
-impl OffsetEnds {
+impl LastSegments {
     /// Connects the active lanes of `offset` to the emitter points that light `base`.
     #[inline(always)]
     pub fn to_lights(scene: &Scene, base: Lanes3, offset: &SurfacePacket, lights: &Lights, active: Mask) -> Self {
@@ -71,7 +71,7 @@ impl OffsetEnds {
         let lit = if carried.any() { scene.visible_packet(surfaces, lights, carried) } else { carried };
         let density = scene.light_pdf(lights, (surfaces.p, angle), lit) + lights.scatter_pdf(evals.pdf);
         Self {
-            value: lit.select3(value * jacobian, Lanes3::ZERO),
+            contribution: lit.select3(value * jacobian, Lanes3::ZERO),
             density: lit.select(density * jacobian, Lanes::ZERO),
         }
     }

@@ -11,20 +11,20 @@ use crate::scene::bsdf::Lobe;
 use crate::scene::packet::Evals;
 
 impl OffsetSegment<'_> {
-    /// Sets the states of the offsets at the next vertices, over one edge.
+    /// Sets the states of the offsets at the next vertices, in one direction.
     #[inline(always)]
     pub fn continue_offsets(
         &self,
         context: &ShiftContext,
         next: &NextVertices,
-        (states, edge): (&mut LevelStates, usize),
+        (states, direction): (&mut LevelStates, usize),
         offsets: &mut OffsetSurfaces,
     ) {
         let leaving = self.leaving & next.exists;
         let (prefix, carried) = self.extended_prefix(self.base_scatter);
         let carried = carried & !self.states.are(Kind::Failed);
         for lane in (leaving & !self.unconnected).lanes() {
-            let (states, to) = states.at(self.vertices.next.0[lane], edge);
+            let (states, to) = states.at(self.vertices.next.0[lane], direction);
             match carried.get(lane) {
                 true => states.set_connected(to, prefix.get(lane)),
                 false => states.fail(to),
@@ -39,14 +39,14 @@ impl OffsetSegment<'_> {
         let (prefix, carried) = self.extended_prefix(Evals { value: found.value, pdf: found.pdf });
         let connected = carried & found.possible;
         for lane in (unconnected & self.connectable).lanes() {
-            let (states, to) = states.at(self.vertices.next.0[lane], edge);
+            let (states, to) = states.at(self.vertices.next.0[lane], direction);
             match connected.get(lane) {
                 true => states.set_just_connected(to, prefix.get(lane), found.wi.get(lane)),
                 false => states.fail(to),
             }
         }
-        self.continue_extended(next, (states, edge), (context, offsets));
-        self.continue_unconnected(context, next, (states, edge), offsets);
+        self.continue_extended(next, (states, direction), (context, offsets));
+        self.continue_unconnected(context, next, (states, direction), offsets);
     }
 
     /// Prefixes behind the segments, over which the offsets scatter as given, and the lanes that carry light on.
@@ -61,13 +61,13 @@ impl OffsetSegment<'_> {
     fn continue_extended(
         &self,
         next: &NextVertices,
-        (states, edge): (&mut LevelStates, usize),
+        (states, direction): (&mut LevelStates, usize),
         (context, offsets): (&ShiftContext, &mut OffsetSurfaces),
     ) {
         for (lane, extension) in self.extensions.iter().filter(|(lane, _)| next.exists.get(*lane)) {
             let kept = extension.as_ref().and_then(|extension| self.own_vertex(*lane, extension));
             let kept = kept.map(|(prefix, hit)| (prefix, offsets.push(context.scene, context.base.len(), &hit)));
-            let (states, to) = states.at(self.vertices.next.0[*lane], edge);
+            let (states, to) = states.at(self.vertices.next.0[*lane], direction);
             match kept {
                 Some((prefix, vertex_index)) => states.set_unconnected(to, prefix, vertex_index),
                 None => states.fail(to),
@@ -81,13 +81,13 @@ impl OffsetSegment<'_> {
         &self,
         context: &ShiftContext,
         next: &NextVertices,
-        (states, edge): (&mut LevelStates, usize),
+        (states, direction): (&mut LevelStates, usize),
         offsets: &mut OffsetSurfaces,
     ) {
         let light = next.lit & !next.connects_light;
         let scatter = next.scattered & !next.connects_scatter;
         for lane in (self.leaving & next.exists & self.connectable & (light | scatter)).lanes() {
-            let vertex_index = self.vertices.next.0[lane];
+            let next_vertex = self.vertices.next.0[lane];
             let (base, offset) = (self.vertices.surfaces.get(lane), self.offset.surfaces.get(lane));
             let extension = context.extend(&base, &self.vertices.scatters.get(lane), &offset);
             let kept = extension.as_ref().and_then(|extension| {
@@ -105,20 +105,12 @@ impl OffsetSegment<'_> {
                 }
                 _ => states.fail(to),
             };
-            match (light.get(lane), scatter.get(lane)) {
-                (true, false) => {
-                    let connected = states.at(vertex_index, edge).0.clone();
-                    let (for_scatter, to) = states.at_for_scatter(vertex_index, edge);
-                    for_scatter.copy(to, &connected);
-                    set(states.at(vertex_index, edge), Lobe::Smooth);
-                }
-                (both, _) => {
-                    if both {
-                        set(states.at(vertex_index, edge), Lobe::Smooth);
-                    }
-                    let there = &context.below[vertex_index as usize / LANES].scatters;
-                    set(states.at_for_scatter(vertex_index, edge), there.get(vertex_index as usize % LANES).lobe);
-                }
+            if light.get(lane) {
+                set(states.at(next_vertex, direction), Lobe::Smooth);
+            }
+            if scatter.get(lane) {
+                let there = &context.below[next_vertex as usize / LANES].scatters;
+                set(states.at_for_scatter(next_vertex, direction), there.get(next_vertex as usize % LANES).lobe);
             }
         }
     }

@@ -1,6 +1,6 @@
 //! One end's share of a difference: (J f(y) - f(x)) / D, D being the sum of both paths' densities.
 
-use super::half_vector::OffsetEnd;
+use super::half_vector::LastSegment;
 use crate::math::lanes::{Lanes, Lanes3};
 
 /// Contributions of sixteen base paths: f(x) before division by `density`, the sum over the sampling strategies.
@@ -24,23 +24,23 @@ impl Contributions {
     }
 }
 
-/// Light that sixteen offsets receive over last segments of their own.
+/// Last segments of sixteen offsets: the light that they receive apart from their base paths.
 #[derive(Clone, Copy)]
-pub struct OffsetEnds {
+pub struct LastSegments {
     /// f cos at the offset's vertex times the radiance received, times dω' / dω; zero where nothing is received.
-    pub value: Lanes3,
+    pub contribution: Lanes3,
     /// Sum of the densities of sampling the emitter point and of hitting it by scattering, times dω' / dω.
     pub density: Lanes,
 }
 
-impl OffsetEnds {
+impl LastSegments {
     /// Nothing is received.
-    pub const NONE: Self = Self { value: Lanes3::ZERO, density: Lanes::ZERO };
+    pub const NONE: Self = Self { contribution: Lanes3::ZERO, density: Lanes::ZERO };
 
     /// Replaces one lane by the last segment of a single offset, if it has one.
-    pub fn set(&mut self, lane: usize, end: Option<OffsetEnd>) {
+    pub fn set(&mut self, lane: usize, end: Option<LastSegment>) {
         let Some(end) = end else { return };
-        self.value.set(lane, end.value * end.radiance * end.jacobian);
+        self.contribution.set(lane, end.scattering * end.radiance * end.jacobian);
         self.density.0[lane] = (end.light_pdf + end.pdf) * end.jacobian;
     }
 }

@@ -36,7 +36,7 @@ fn copy(scene: &Scene, base: &Surface, (wo, lobe): (Vec3, Lobe), offset: &Surfac
     let bsdf = scene.bsdf(offset);
     if lobe.is_delta() {
         let delta = bsdf.delta(offset, offset.wi, lobe)?;
-        // If the base's material cannot tell its lobes apart the inverse shift fails, so this one has to.
+        // If the base's material has several lobes of this kind (a blend), the inverse shift fails, so this one has to.
         scene.bsdf(base).delta(base, base.wi, lobe)?;
         return Some(Copied { wo: delta.wo, value: delta.value, pdf: delta.probability, jacobian: 1.0 });
     }
@@ -87,9 +87,9 @@ pub fn refract(wi: Vec3, wo: Vec3, offset_wi: Vec3, eta: f32) -> Option<(Vec3, f
 }
 
 /// The last segment of an offset, to an emitter.
-pub struct OffsetEnd {
+pub struct LastSegment {
     /// f cos at the offset's vertex.
-    pub value: Rgb,
+    pub scattering: Rgb,
     /// Density per solid angle of scattering along it, or probability of a delta lobe.
     pub pdf: f32,
     /// Density per solid angle of sampling the emitter point by next-event estimation; 0 after a delta lobe.
@@ -102,14 +102,14 @@ pub struct OffsetEnd {
 
 impl Extension {
     /// The offset's last segment to the unoccluded ambient light.
-    pub fn to_ambient(&self) -> OffsetEnd {
+    pub fn to_ambient(&self) -> LastSegment {
         let Copied { value, pdf, jacobian, .. } = self.copied;
-        OffsetEnd { value, pdf, light_pdf: 0.0, radiance: Rgb::ONE, jacobian }
+        LastSegment { scattering: value, pdf, light_pdf: 0.0, radiance: Rgb::ONE, jacobian }
     }
 
     /// The offset's last segment when the base path's ends on the emitter point `target`: it has to end on an emitter, too,
     /// and at infinity only if the base path does.
-    pub fn end(&self, scene: &Scene, offset: &Surface, target: &LightPoint) -> Option<OffsetEnd> {
+    pub fn end(&self, scene: &Scene, offset: &Surface, target: &LightPoint) -> Option<LastSegment> {
         let far = matches!(target.position, Position::Infinity { .. });
         let point = match &self.hit {
             Some(hit) if !far => scene.light_point(hit)?,
@@ -119,6 +119,6 @@ impl Extension {
         let light_pdf = if self.delta { 0.0 } else { scene.emitter_pdf(offset.p, &point) };
         let radiance = scene.radiance(&point, -self.direction);
         let Copied { value, pdf, jacobian, .. } = self.copied;
-        Some(OffsetEnd { value, pdf, light_pdf, radiance, jacobian })
+        Some(LastSegment { scattering: value, pdf, light_pdf, radiance, jacobian })
     }
 }

@@ -83,10 +83,10 @@ impl ShiftMapping for Reconnect {
                 below,
             };
             for (packet, vertices) in levels[depth][..count].iter().enumerate() {
-                self.shift_packet(&context, (depth as u32, packet), vertices, lit_length, |id, edge, found| {
+                self.shift_packet(&context, (depth as u32, packet), vertices, lit_length, |id, direction, found| {
                     let Some(differences) = &mut samples[id].differences else { return };
-                    differences.color[edge] += found.0;
-                    differences.ambient[edge] += found.1;
+                    differences.color[direction] += found.0;
+                    differences.ambient[direction] += found.1;
                 });
             }
             std::mem::swap(&mut self.states, &mut self.next);
@@ -100,9 +100,9 @@ impl Reconnect {
         self.states.reset(packets);
         let start = Prefix { throughput: Rgb::ONE, ratio: 1.0 };
         for (sample, _) in lit_length.iter().enumerate().filter(|(_, length)| **length > 0) {
-            for edge in 0..CROSS.len() {
-                let vertex_index = self.offsets.first(sample, edge);
-                let (states, lane) = self.states.at(sample as u32, edge);
+            for direction in 0..CROSS.len() {
+                let vertex_index = self.offsets.first(sample, direction);
+                let (states, lane) = self.states.at(sample as u32, direction);
                 match vertex_index {
                     OUT_OF_FILM => {}
                     MISS => states.fail(lane),
@@ -112,7 +112,7 @@ impl Reconnect {
         }
     }
 
-    /// Shifts the segments that leave sixteen vertices, over all edges; `add` takes the sample, the edge, and the shares
+    /// Shifts the segments that leave sixteen vertices, over all edges; `add` takes the sample, the direction, and the shares
     /// of the differences of the scene's and of the ambient light.
     fn shift_packet(
         &mut self,
@@ -125,34 +125,34 @@ impl Reconnect {
         // The part of a path behind its last lit vertex contributes nothing: the other ends of the edges account for
         // whatever shifted copies of it would receive.
         let reaches = |id: u32, depth: u32| lit_length[id as usize] > depth;
-        let mut lit = vertices.hit;
-        vertices.hit.lanes().for_each(|lane| lit.set(lane, reaches(vertices.id.0[lane], depth)));
-        if !lit.any() {
+        let mut reached = vertices.hit;
+        vertices.hit.lanes().for_each(|lane| reached.set(lane, reaches(vertices.id.0[lane], depth)));
+        if !reached.any() {
             return;
         }
         let unconnected = self.states.unconnected(packet);
-        let next = NextVertices::new(context, vertices, lit, unconnected, |id| reaches(id, depth + 1));
-        for edge in 0..CROSS.len() {
-            let (for_light, for_scatter) = self.states.get(packet, edge);
-            let inside = lit & for_light.inside();
-            let step = Step { context, vertices, next: &next, active: lit, edge };
+        let next = NextVertices::new(context, vertices, reached, unconnected, |id| reaches(id, depth + 1));
+        for direction in 0..CROSS.len() {
+            let (for_light, for_scatter) = self.states.get(packet, direction);
+            let inside = reached & for_light.inside();
+            let step = Step { context, vertices, next: &next, active: reached, direction };
             let to = (&mut self.next, &mut self.offsets);
             let found = shift_segment(&step, &mut self.scratch, (for_light, for_scatter), to);
             for lane in inside.lanes() {
                 let ambient = if self.ambient { found.ambient.get(lane) } else { Rgb::ZERO };
-                add(vertices.id.0[lane] as usize, edge, (found.color.get(lane), ambient));
+                add(vertices.id.0[lane] as usize, direction, (found.color.get(lane), ambient));
             }
         }
     }
 }
 
-/// The offsets of sixteen base paths across one edge, on the way from one vertex to the next.
+/// The offsets of sixteen base paths in one direction, on the way from one vertex to the next.
 struct Step<'a> {
     context: &'a ShiftContext<'a>,
     vertices: &'a Vertices,
     next: &'a NextVertices,
     active: Mask,
-    edge: usize,
+    direction: usize,
 }
 
 /// Returns the differences of the light sampled at the vertices and of the emitters hit next, and sets the states of the
@@ -164,18 +164,18 @@ fn shift_segment(
     (for_light, for_scatter): (&States, &States),
     (next_states, offsets): (&mut LevelStates, &mut OffsetSurfaces),
 ) -> SegmentDifferences {
-    let Step { context, vertices, next, active, edge } = *step;
+    let Step { context, vertices, next, active, direction } = *step;
     scratch.load_offsets(context, offsets, (for_light, for_scatter), active);
     let lit = active & vertices.lit & for_light.inside();
     let sampled =
         if lit.any() { sampled_emitters(context, vertices, scratch.offset(), for_light, lit) } else { Lanes3::ZERO };
     let ambient = if context.ambient { active } else { Mask::NONE };
-    let leaving = active & for_scatter.inside() & vertices.scattered & (next.exists | vertices.emits | ambient);
+    let leaving = active & for_scatter.inside() & vertices.scattered & (next.exists | vertices.hits_emitter | ambient);
     if !leaving.any() {
         return SegmentDifferences { color: sampled, ambient: Lanes3::ZERO };
     }
     let segment = OffsetSegment::new(context, vertices, scratch, for_scatter, leaving);
     let hit = segment.emission_differences(context);
-    segment.continue_offsets(context, next, (next_states, edge), offsets);
+    segment.continue_offsets(context, next, (next_states, direction), offsets);
     SegmentDifferences { color: sampled + hit.color, ambient: hit.ambient }
 }

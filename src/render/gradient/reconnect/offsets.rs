@@ -9,7 +9,7 @@ use crate::render::vertices::Vertices;
 use crate::scene::packet::{Materials, Rays, Surfaces};
 use crate::scene::{Scene, Surface};
 
-/// Vertex index of an offset that hits nothing.
+/// Vertex index of an offset that hits nothing, and of pixels of the window without an index yet.
 pub const MISS: u32 = u32::MAX;
 /// Vertex index of an offset whose pixel lies outside the film.
 pub const OUT_OF_FILM: u32 = u32::MAX - 1;
@@ -29,9 +29,9 @@ pub struct SurfacePacket {
 pub struct OffsetSurfaces {
     traced: Vec<SurfacePacket>,
     hits: Vec<Mask>,
-    /// Number of traced surfaces.
-    count: usize,
-    /// Vertex indices of the camera hits, by sample and edge.
+    /// Lanes of `traced` that are in use, including those of packets that are not full.
+    lanes_used: usize,
+    /// Vertex indices of the camera hits, by sample and direction.
     first: Vec<[u32; 4]>,
     /// Vertex indices of the pixels in a window around the wave's, row by row.
     window: Vec<u32>,
@@ -42,7 +42,7 @@ pub struct OffsetSurfaces {
 impl OffsetSurfaces {
     /// Finds the camera hits of all offsets of a wave; `level` holds those of the base paths.
     pub fn start(&mut self, scene: &Scene, camera: &CameraSamples, level: &[Vertices]) {
-        self.count = 0;
+        self.lanes_used = 0;
         self.first.clear();
         if scene.sensor().has_lens() {
             self.trace_all(scene, camera);
@@ -52,21 +52,21 @@ impl OffsetSurfaces {
     }
 
     /// Vertex index of an offset's camera hit, [`MISS`] or [`OUT_OF_FILM`].
-    pub fn first(&self, sample: usize, edge: usize) -> u32 {
-        self.first[sample][edge]
+    pub fn first(&self, sample: usize, direction: usize) -> u32 {
+        self.first[sample][direction]
     }
 
     /// Keeps the hit of an unconnected offset and returns its vertex index; `base` is the number of packets of camera hits.
     pub fn push(&mut self, scene: &Scene, base: usize, surface: &Surface) -> u32 {
-        let lane = self.count % LANES;
+        let lane = self.lanes_used % LANES;
         let packet = self.next_packet();
         packet.surfaces.set(lane, surface);
         let (mut one, mut materials) = (Mask::NONE, Materials::default());
         one.set(lane, true);
         materials.evaluate(scene, &packet.surfaces, one);
         packet.materials.copy(lane, &materials, lane);
-        self.count += 1;
-        (base * LANES + self.count - 1) as u32
+        self.lanes_used += 1;
+        (base * LANES + self.lanes_used - 1) as u32
     }
 
     /// The surface at a vertex index, as packet and lane; `level` holds the camera hits of the base paths.
@@ -83,7 +83,7 @@ impl OffsetSurfaces {
     }
 
     fn next_packet(&mut self) -> &mut SurfacePacket {
-        let packet = self.count / LANES;
+        let packet = self.lanes_used / LANES;
         if packet == self.traced.len() {
             self.traced.push(SurfacePacket::default());
             self.hits.push(Mask::NONE);
@@ -144,14 +144,14 @@ impl OffsetSurfaces {
         for first in (0..camera.pixels.len()).step_by(LANES) {
             let hashes = camera.hashes(first);
             let count = LANES.min(camera.pixels.len() - first);
-            for (edge, step) in CROSS.into_iter().enumerate() {
+            for (direction, step) in CROSS.into_iter().enumerate() {
                 let rays = camera.rays(scene, first, hashes, vec2(step.0 as f32, step.1 as f32));
-                let packet = base + self.count / LANES;
+                let packet = base + self.lanes_used / LANES;
                 let hit = self.intersect(scene, &rays, count);
                 for (lane, &pixel) in camera.pixels[first..].iter().take(count).enumerate() {
                     let index = if hit.get(lane) { (packet * LANES + lane) as u32 } else { MISS };
                     let inside = camera.neighbour(pixel, step).is_some();
-                    self.first[first + lane][edge] = if inside { index } else { OUT_OF_FILM };
+                    self.first[first + lane][direction] = if inside { index } else { OUT_OF_FILM };
                 }
             }
         }
@@ -164,9 +164,9 @@ impl OffsetSurfaces {
             scene.pass_emitters(rays, &mut hit, &mut packet.surfaces);
         }
         packet.materials.evaluate(scene, &packet.surfaces, hit);
-        let at = self.count / LANES;
+        let at = self.lanes_used / LANES;
         self.hits[at] = hit;
-        self.count += LANES;
+        self.lanes_used += LANES;
         hit
     }
 }

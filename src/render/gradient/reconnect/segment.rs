@@ -12,7 +12,7 @@ use crate::scene::{Scene, Surface};
 /// One depth of a wave's base paths.
 pub struct ShiftContext<'a> {
     pub scene: &'a Scene,
-    /// Roughness above which a smooth lobe counts as diffuse.
+    /// Least roughness of the smooth lobes above which a material counts as diffuse.
     pub threshold: f32,
     /// Whether differences of the ambient light are recorded.
     pub ambient: bool,
@@ -30,7 +30,7 @@ pub struct NextVertices {
     pub surfaces: Surfaces,
     /// Lanes whose light is connected to.
     pub connects_light: Mask,
-    /// Lanes that receive light from a sampled emitter point.
+    /// Lanes that receive light from a sampled emitter point; like all below, set only where an offset is unconnected.
     pub lit: Mask,
     /// Lanes whose continuation is connected to.
     pub connects_scatter: Mask,
@@ -130,7 +130,8 @@ pub struct OffsetSegment<'a> {
     pub leaving: Mask,
     /// Lanes among them whose offset is unconnected.
     pub unconnected: Mask,
-    /// Scattering of the offsets that leave the same vertices in the same directions as their base paths.
+    /// BSDF values and densities of connected and just connected offsets, which leave the base paths' vertices in the same
+    /// directions as these.
     pub base_scatter: Evals,
     /// Lanes with an unconnected offset where both paths scatter diffusely, so that the offset can be connected.
     pub connectable: Mask,
@@ -161,8 +162,8 @@ impl<'a> OffsetSegment<'a> {
     }
 }
 
-/// Scattering of offsets that leave the same vertices in the same directions as their base paths: the same, unless they
-/// arrive from another direction.
+/// BSDF values and densities of offsets that leave the base paths' vertices in the same directions as these: the base
+/// paths' own, unless the offset arrives from another direction.
 #[inline(always)]
 fn base_scatter(scene: &Scene, vertices: &Vertices, states: &States, leaving: Mask) -> Evals {
     let Vertices { surfaces, materials, scatters, .. } = vertices;

@@ -156,35 +156,35 @@ impl LevelStates {
         self.for_light[..packets].iter_mut().flatten().for_each(|states| states.kind = Bits::ZERO);
     }
 
-    /// States of a packet over an edge: for light and for the continuation.
-    pub fn get(&mut self, packet: usize, edge: usize) -> (&States, &States) {
-        let (states, differs) = (&self.for_light[packet][edge], self.differs[packet][edge]);
+    /// States of a packet in a direction: for light and for the continuation.
+    pub fn get(&mut self, packet: usize, direction: usize) -> (&States, &States) {
+        let (states, differs) = (&self.for_light[packet][direction], self.differs[packet][direction]);
         if !differs.any() {
             return (states, states);
         }
-        let for_scatter = &mut self.for_scatter[packet][edge];
+        let for_scatter = &mut self.for_scatter[packet][direction];
         for lane in (!differs).lanes() {
             for_scatter.copy(lane, states);
         }
         (states, for_scatter)
     }
 
-    /// Lanes of a packet with an offset, across any edge, that continues from a vertex of its own.
+    /// Lanes of a packet with an offset, in any direction, that continues from a vertex of its own.
     pub fn unconnected(&mut self, packet: usize) -> Mask {
-        (0..4).fold(Mask::NONE, |all, edge| all | self.get(packet, edge).1.are(Kind::Unconnected))
+        (0..4).fold(Mask::NONE, |all, direction| all | self.get(packet, direction).1.are(Kind::Unconnected))
     }
 
     /// The state at a vertex for light and, where it does not differ, for the continuation.
     #[inline(always)]
-    pub fn at(&mut self, vertex_index: u32, edge: usize) -> (&mut States, usize) {
+    pub fn at(&mut self, vertex_index: u32, direction: usize) -> (&mut States, usize) {
         let (packet, lane) = (vertex_index as usize / LANES, vertex_index as usize % LANES);
-        (&mut self.for_light[packet][edge], lane)
+        (&mut self.for_light[packet][direction], lane)
     }
 
     /// The state at a vertex for a continuation that differs.
-    pub fn at_for_scatter(&mut self, vertex_index: u32, edge: usize) -> (&mut States, usize) {
+    pub fn at_for_scatter(&mut self, vertex_index: u32, direction: usize) -> (&mut States, usize) {
         let (packet, lane) = (vertex_index as usize / LANES, vertex_index as usize % LANES);
-        self.differs[packet][edge].set(lane, true);
-        (&mut self.for_scatter[packet][edge], lane)
+        self.differs[packet][direction].set(lane, true);
+        (&mut self.for_scatter[packet][direction], lane)
     }
 }
