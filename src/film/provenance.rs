@@ -25,7 +25,7 @@ pub struct Provenance {
 const PREFIX: &str = "fluxion:";
 
 impl Provenance {
-    /// Names of the attributes, in the order of [`Provenance::values`].
+    /// Names of the attributes, in the order of the fields.
     pub const NAMES: [&'static str; 8] = [
         "fluxion:version",
         "fluxion:scene",

@@ -319,14 +319,14 @@ impl<'a> Groups<'a> {
         let weights: [f32; BINS] = std::array::from_fn(|k| (drawn[k] * counts[k]) as f32);
         let share = 1.0 / weights.iter().sum::<f32>().max(1.0);
         let (mut mean, mut squares) = ([0.0; 4], 0.0);
-        for c in 0..3 {
+        for (c, mean) in mean.iter_mut().take(3).enumerate() {
             let mut values: [f32; BINS] = std::array::from_fn(|k| value(k, c) * self.scale);
             if self.ambient > 0.0 {
                 (0..BINS).for_each(|k| values[k] += ambient(k, c) * self.ambient);
             }
-            mean[c] = share * (0..BINS).map(|k| weights[k] * values[k]).sum::<f32>();
+            *mean = share * (0..BINS).map(|k| weights[k] * values[k]).sum::<f32>();
             if with_variance {
-                squares += (0..BINS).map(|k| weights[k] * (values[k] - mean[c]).powi(2)).sum::<f32>();
+                squares += (0..BINS).map(|k| weights[k] * (values[k] - *mean).powi(2)).sum::<f32>();
             }
         }
         let groups: u32 = drawn.iter().sum();

@@ -70,8 +70,11 @@ pub fn differences(image: &Image, step: (usize, usize)) -> Image {
     })
 }
 
-/// The sampled quantities: layer of the mean, of its variance, and of the means of the bins.
-pub const SAMPLED: [(Layer, Layer, fn(u8) -> Layer); 3] = [
+/// Layers of a sampled quantity: its mean, its variance, and the means of its bins.
+pub type Sampled = (Layer, Layer, fn(u8) -> Layer);
+
+/// The sampled quantities: colour and differences.
+pub const SAMPLED: [Sampled; 3] = [
     (Layer::Color, Layer::ColorVariance, Layer::BinColor),
     (Layer::Dx, Layer::DxVariance, Layer::BinDx),
     (Layer::Dy, Layer::DyVariance, Layer::BinDy),
