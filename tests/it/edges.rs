@@ -1,11 +1,11 @@
 //! Methods on edges between any pixels, which a frame holds in place of the cross of its layers.
 
 use fluxion::error::Error;
-use fluxion::film::{BINS, Edges, Frame};
+use fluxion::film::{BINS, Edges, Frame, Layer};
 use fluxion::image::Image;
 use fluxion::math::{Rgb, rng};
 use fluxion::reconstruct::{Context, parse, solve};
-use fluxion::synthetic::{exact, picture};
+use fluxion::synthetic::{change, exact, picture};
 
 const SIZE: (usize, usize) = (31, 22);
 
@@ -81,7 +81,8 @@ fn edges_spread_what_they_know_as_those_of_layers_do() {
     };
     let color = noisy(5, &image);
     let with_color = |mut frame: Frame| {
-        frame.set(fluxion::film::Layer::Color, color.clone());
+        frame.set(Layer::Color, color.clone());
+        change(&mut frame, Layer::ColorVariance, |_, _| 0.2 * 0.2 / 12.0);
         frame
     };
     // The cross as edges of its own: another solver, but the same problem.
