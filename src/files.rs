@@ -28,7 +28,7 @@ pub fn replace(path: &Path, write: impl FnOnce(&Path) -> Result<()>) -> Result<(
         let _ = fs::remove_file(&part);
     }
     done.map_err(|error| match error {
-        // The user knows nothing of the file beside.
+        // The temporary file is no concern of the user's.
         Error::Io { what, .. } => Error::io(path, what.replace(&*part.to_string_lossy(), &path.to_string_lossy())),
         other => other,
     })

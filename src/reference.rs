@@ -102,7 +102,7 @@ impl Reference {
             let (new, old) = (0.5 * (at(&a.0) + at(&b.0)), at(&self.image));
             let difference = at(&self.difference);
             let new_difference = at(&a.0) - at(&b.0);
-            // Sums of squared deviations: of what there was, of both halves, and between all of them.
+            // Sums of squared deviations: of the samples so far, of both new halves, and between all of them.
             let squares = |variance: f64, n: f64| variance * n * (n - 1.0).max(0.0);
             let within = squares(at(&self.variance), n) + squares(at(&a.1), m / 2.0) + squares(at(&b.1), m / 2.0);
             let between = 0.25 * new_difference * new_difference * m + (new - old) * (new - old) * n * share;

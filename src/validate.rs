@@ -41,7 +41,7 @@ pub fn check(folder: &Path, spp: u32, seed: u64) -> Result<Verdict> {
         let (value, expected) = (at(&own.image), at(&reference.image));
         let rounding = HALF_ROUNDING * expected;
         // Few samples may all have missed what makes the noise, and the reference may have missed what a few
-        // have hit: the larger of both figures is believed.
+        // have hit: the larger of both variances is used.
         let variance = at(&reference.variance);
         let own_variance = at(&own.variance).max(variance * f64::from(reference.spp) / f64::from(own.spp));
         let variance = variance + own_variance + rounding * rounding;

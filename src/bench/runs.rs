@@ -54,7 +54,7 @@ fn left_out(case: &Case, method: &str, budget: Budget, reason: String) -> LeftOu
     LeftOut { scene: case.name.clone(), method: method.to_owned(), budget: budget.to_string(), reason }
 }
 
-/// A method and what is known of its times.
+/// A method with its times so far.
 struct Candidate<'a> {
     runner: Runner<'a>,
     /// From trying, which decides what is worth starting; and from the last run, which says how long to render.

@@ -83,7 +83,7 @@ impl<T: Read> Read for Summed<T> {
     }
 }
 
-/// Writes a checkpoint, which takes the place of what is at `path` when it is complete.
+/// Writes a checkpoint, which replaces the file at `path` when it is complete.
 pub fn save(path: &Path, origin: &Origin, outcome: &RenderOutcome, journal: Option<&Journal>) -> Result<()> {
     files::replace(path, |part| {
         let write = || {

@@ -25,7 +25,7 @@ unsafe extern "C" {
 #[cold]
 fn fail(bytes: usize) -> ! {
     let kept = KEPT.get().map_or("", String::as_str);
-    // Formatting into an unbuffered stream allocates nothing. There is nobody left to tell if it fails.
+    // Formatting into an unbuffered stream allocates nothing. Its failure cannot be reported.
     let _ = writeln!(
         std::io::stderr(),
         "error: out of memory: {bytes} bytes more are not to be had; a smaller --size or --max-memory takes less{kept}"

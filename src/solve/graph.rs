@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use crate::film::Edges;
 
-/// Up to four right-hand sides or solutions at a node, which are worked on together.
+/// Up to four right-hand sides or solutions at a node, which are solved together.
 pub type Quad = [f32; 4];
 
 /// Nodes that a thread takes at a time.

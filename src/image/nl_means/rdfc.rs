@@ -233,7 +233,7 @@ fn finish(guides: &Guides, tile: PlaneTile, sums: &[[Sums; 3]]) -> Vec<f32> {
                 error += step * step;
                 weight_derivative = weight_derivative - step * sums.weighted_steps[c];
             }
-            // dF/du, mean over the channels; outside [0, 1] it is not believed.
+            // dF/du, mean over the channels; values outside [0, 1] are noise, and clamped.
             let direct = centre / total;
             let follows = Lanes::splat(2.0 / (3 * side * side) as f32) * noise * weight_derivative / total;
             let slope = direct + if k < 2 { follows } else { Lanes::ZERO };

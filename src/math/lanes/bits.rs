@@ -1,4 +1,4 @@
-//! Sixteen unsigned integers that are worked on together.
+//! Sixteen unsigned integers as a vector.
 
 use super::{LANES, Lanes, Mask};
 

@@ -1,4 +1,4 @@
-//! Sixteen vectors, or colours, that are worked on together.
+//! Sixteen vectors or colours, coordinate by coordinate.
 
 use std::ops::{Add, AddAssign, Mul, Neg, Sub};
 

@@ -67,7 +67,7 @@ impl Bsdf for Blend {
         sum
     }
 
-    /// None also where the two lead in different directions: then nobody can tell which one a path has taken.
+    /// `None` also if both materials have the lobe in different directions, since a path does not say which it has taken.
     fn delta(&self, surface: &Surface, wi: Vec3, lobe: Lobe) -> Option<Delta> {
         let [first, second] = self.parts(surface).map(|(bsdf, share)| {
             let delta = bsdf.delta(surface, wi, lobe).filter(|_| share > 0.0)?;
