@@ -51,7 +51,7 @@ struct DeviceHandle {
     reported: Box<Reported>,
 }
 
-// SAFETY: Embree's device and scene functions may be called from any thread; the reported is behind a mutex.
+// SAFETY: Embree's device and scene functions may be called from any thread; the reported error is behind a mutex.
 unsafe impl Send for DeviceHandle {}
 // SAFETY: as above.
 unsafe impl Sync for DeviceHandle {}
@@ -71,7 +71,7 @@ impl Drop for DeviceHandle {
 }
 
 unsafe extern "C" fn remember(user: *mut c_void, code: c_int, message: *const c_char) {
-    // SAFETY: Embree passes back the reported's address given at creation, and a NUL-terminated string.
+    // SAFETY: Embree passes back the address of the reported error given at creation, and a NUL-terminated string.
     let (reported, message) = unsafe { (&*user.cast::<Reported>(), CStr::from_ptr(message)) };
     let mut slot = reported.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
     let message = message.to_string_lossy();
@@ -94,7 +94,7 @@ impl Device {
         let config = CString::new(config).map_err(|_| Error::backend("embree", "configuration holds a NUL byte"))?;
         let reported = Box::new(Mutex::new(None));
         let user = std::ptr::from_ref::<Reported>(&reported).cast_mut().cast();
-        // SAFETY: the string lives through the call; the reported is boxed and outlives the device.
+        // SAFETY: the string lives through the call; the reported error is boxed and outlives the device.
         let raw = unsafe { raw::fluxion_device_new(config.as_ptr(), Some(remember), user) };
         if raw.is_null() {
             let message = reported.lock().ok().and_then(|mut slot| slot.take());
@@ -385,7 +385,7 @@ mod tests {
     #[test]
     fn an_error_callback_surfaces_as_an_error() {
         let device = Device::new(1).unwrap();
-        // SAFETY: the callback gets the live reported and a static string, as from Embree.
+        // SAFETY: the callback gets the live reported error and a static string, as from Embree.
         unsafe {
             remember(std::ptr::from_ref::<Reported>(&device.0.reported).cast_mut().cast(), 2, c"no room".as_ptr())
         };

@@ -4,9 +4,9 @@ use super::BINS;
 use crate::image::Image;
 use crate::math::Rgb;
 
-/// Undirected edges between any two pixels of an image, in compressed sparse rows: one row for each pixel, with its edges to
-/// pixels of higher index. Pixels are numbered along the lines of the image. Values are those of the lower end towards the higher one:
-/// `mean[e]` estimates I(higher) - I(lower), in radiance.
+/// Undirected edges between any two pixels of an image, in compressed sparse rows: one row for each pixel, with its edges
+/// to pixels of higher index. Pixels are numbered along the lines of the image. Values are those of the lower end towards
+/// the higher one: `mean[e]` estimates I(higher) - I(lower), in radiance.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Edges {
     /// Start of every pixel's row among the edges, and the end of the last: one entry more than there are pixels.

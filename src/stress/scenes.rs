@@ -30,7 +30,7 @@ pub const CASES: &[Case] = &[
     Case { name: "scenes/million", summary: "a million emitters instead of one", run: million },
     Case { name: "scenes/depth", summary: "paths of one edge, and of ten thousand", run: depth },
     Case { name: "scenes/corridor", summary: "light after ten mirrors, and after ten bounces", run: corridor },
-    Case { name: "scenes/mirrors", summary: "a room of mirrors that area_emitter", run: mirrors },
+    Case { name: "scenes/mirrors", summary: "a room of emissive mirrors", run: mirrors },
 ];
 
 /// The irradiance that a small emitter of radiance one, an area of `area` at distance `d` straight above, makes.

@@ -1,4 +1,4 @@
-//! A shape that emissive on its outside.
+//! Area emitters: shapes that emit on their outside.
 
 use std::f32::consts::PI;
 use std::sync::Arc;
