@@ -35,10 +35,10 @@ licences:
 	@command -v cargo-deny > /dev/null || cargo install cargo-deny --locked
 	cargo deny check licenses bans sources
 
-# Small renders under valgrind.
+# Small renders under valgrind, which lacks some vector instructions: without them.
 memcheck: packages
 	@sh .ci/packages valgrind
-	cargo build --release
+	RUSTFLAGS="--cfg baseline" cargo build --release --target-dir target/memcheck
 	tools/memcheck/run
 
 # Installs what is missing, through sudo when not root. Elsewhere than on Debian it says what is needed.

@@ -73,7 +73,10 @@ impl Feature {
     }
 }
 
-#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
+#[cfg_attr(
+    not(baseline),
+    multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))
+)]
 fn clean_tile(mean: &Planes, noise: &Planes, tile: PlaneTile) -> Vec<f32> {
     let mut out = vec![0.0; 4 * tile.width * tile.height];
     for (x, y) in tile.blocks() {

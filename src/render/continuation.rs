@@ -22,7 +22,10 @@ pub struct Shaded {
 
 /// Samples emitters at some vertices, then directions, and appends the paths that survive to `next`. `first_index` is the
 /// index of the first vertex among all of the level.
-#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
+#[cfg_attr(
+    not(baseline),
+    multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))
+)]
 pub fn shade(
     (scene, sampler): (&Scene, &Sampler),
     depth: u32,

@@ -65,7 +65,10 @@ pub fn clean(noisy: &Guide, tolerance: f32) -> Planes {
 
 /// Weights of a tile's pixels for those of their windows, centres included, by colour alone. For each of the tile's
 /// blocks the offsets follow each other, row by row, with a weight for every pixel. Those outside the image have none.
-#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
+#[cfg_attr(
+    not(baseline),
+    multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))
+)]
 pub fn weights(guide: &Guide, settings: NlmSettings, tile: PlaneTile) -> Vec<f32> {
     let offsets = (2 * settings.window + 1).pow(2);
     let mut weights = vec![0.0; offsets * tile.height * tile.width.next_multiple_of(LANES)];
@@ -101,7 +104,10 @@ fn offsets(radius: usize) -> impl Iterator<Item = (isize, isize)> {
     window(radius).filter(|&offset| offset != (0, 0))
 }
 
-#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
+#[cfg_attr(
+    not(baseline),
+    multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))
+)]
 fn filter_tile(values: &Planes, guides: &Guides, settings: NlmSettings, tile: PlaneTile) -> Vec<f32> {
     let width = tile.width.next_multiple_of(LANES);
     let channels = values.channels();

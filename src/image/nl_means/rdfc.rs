@@ -152,7 +152,10 @@ fn alike(patches: &Patches, k: usize, x: usize, y: usize) -> Lanes {
 }
 
 /// Nine planes of filtered colours, three of errors, three of slopes.
-#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
+#[cfg_attr(
+    not(baseline),
+    multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))
+)]
 fn denoise_tile(guides: &Guides, tile: PlaneTile, options: Options) -> Vec<f32> {
     let width = tile.width.next_multiple_of(LANES);
     let mut sums = vec![[EMPTY; 3]; tile.height * width / LANES];

@@ -40,7 +40,10 @@ impl Candidates<'_> {
     }
 }
 
-#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
+#[cfg_attr(
+    not(baseline),
+    multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))
+)]
 fn block(candidates: &Candidates, pilot: Option<&Blocks>, (x, y): (usize, usize)) -> [Lanes; CHANNELS] {
     let Regression { features, color, weight } = candidates.problem;
     let here = features.at(x, y);

@@ -93,7 +93,10 @@ impl Regression<'_> {
     }
 }
 
-#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
+#[cfg_attr(
+    not(baseline),
+    multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))
+)]
 fn products(columns: &[Lanes], color: &[Lanes], weight: Lanes, sums: &mut [f64]) {
     let mut weighted = [Lanes::ZERO; COLUMNS];
     for (slot, &column) in weighted.iter_mut().zip(columns) {

@@ -113,7 +113,10 @@ fn exact_tile(problem: &FilterProblem, tile: PlaneTile) -> Vec<f32> {
     out
 }
 
-#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
+#[cfg_attr(
+    not(baseline),
+    multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))
+)]
 fn sweep_tile(problem: &FilterProblem, tile: PlaneTile) -> Vec<f32> {
     let mut out = vec![0.0; 6 * tile.width * tile.height];
     let mut weights = vec![Lanes::ZERO; (2 * problem.radius + 1).pow(2)];

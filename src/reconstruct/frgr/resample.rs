@@ -157,7 +157,10 @@ impl Resampling {
 /// Most channels of a guide.
 const CHANNELS: usize = 9;
 
-#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
+#[cfg_attr(
+    not(baseline),
+    multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))
+)]
 fn fit_row(guide: &Planes, coarse: &Planes, y: usize) -> Fit {
     let channels = guide.channels().min(CHANNELS);
     let mut fit = Fit { pairs: vec![Pair::default(); guide.width], left: vec![0.0; guide.width] };

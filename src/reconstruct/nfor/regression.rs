@@ -82,7 +82,10 @@ fn columns(features: &Planes, centre: &[Lanes; FEATURES], q: (isize, isize), ste
 }
 
 /// Weighted sums of the fitted colours and of the weights, over a tile and the windows' margin around it.
-#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
+#[cfg_attr(
+    not(baseline),
+    multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))
+)]
 fn fit_tile(color: &Planes, features: &Planes, weights: &[f32], tile: PlaneTile) -> Vec<f32> {
     let r = WINDOW as isize;
     let (stride, rows) = reach(tile);

@@ -263,7 +263,10 @@ impl Scene {
     }
 }
 
-#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
+#[cfg_attr(
+    not(baseline),
+    multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))
+)]
 fn shadow_rays(scene_size: f32, from: &Surfaces, lights: &Lights) -> Rays {
     let towards = lights.far.select3(lights.at, lights.at - from.p);
     let origin = from.leave(towards);

@@ -215,7 +215,10 @@ impl Scene {
     }
 }
 
-#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
+#[cfg_attr(
+    not(baseline),
+    multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))
+)]
 fn between(a: &Surfaces, b: &Surfaces) -> Rays {
     let origin = a.leave(b.p - a.p);
     let end = b.leave(a.p - b.p);
@@ -223,7 +226,10 @@ fn between(a: &Surfaces, b: &Surfaces) -> Rays {
 }
 
 /// Completes the hits on meshes in lanes; returns the lanes of all other hits.
-#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
+#[cfg_attr(
+    not(baseline),
+    multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))
+)]
 fn meshes(
     (shapes, shape_infos): (&[Shape], &[ShapeInfo]),
     scene_size: f32,

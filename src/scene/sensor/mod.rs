@@ -179,7 +179,10 @@ impl Sensor {
     }
 }
 
-#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
+#[cfg_attr(
+    not(baseline),
+    multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))
+)]
 fn view(sensor: &Sensor, [x, y]: [Lanes; 2], [lens_u, lens_v]: [Lanes; 2]) -> Rays {
     // Window to film and film to the plane at distance one are one scale and one shift together.
     let (start, end) = (sensor.film.position(Vec2::ZERO), sensor.film.position(Vec2::ONE));

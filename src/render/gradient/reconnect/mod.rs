@@ -157,7 +157,10 @@ struct Step<'a> {
 
 /// Returns the differences of the light sampled at the vertices and of the emitters hit next, and sets the states of the
 /// offsets at the next vertices.
-#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
+#[cfg_attr(
+    not(baseline),
+    multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))
+)]
 fn shift_segment(
     step: &Step,
     scratch: &mut Scratch,
