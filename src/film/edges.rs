@@ -70,16 +70,36 @@ pub struct Cross<'a> {
 impl Edges {
     /// Edges to the right (kind 0) and downwards (kind 1) from all pixels, without values.
     pub fn cross((width, height): (usize, usize)) -> Self {
-        let mut ends = Vec::with_capacity(2 * width * height);
-        for i in 0..width * height {
-            if !(i + 1).is_multiple_of(width) {
-                ends.push([i as u32, i as u32 + 1]);
+        let pixels = width * height;
+        let mut edges = Self { offsets: vec![(1, 0), (0, 1)], ..Self::default() };
+        (edges.rows, edges.incident_rows) = (Vec::with_capacity(pixels + 1), Vec::with_capacity(pixels + 1));
+        (edges.ends, edges.kinds) = (Vec::with_capacity(2 * pixels), Vec::with_capacity(2 * pixels));
+        edges.incident = Vec::with_capacity(4 * pixels);
+        for i in 0..pixels {
+            let (row, right, down) = (edges.ends.len() as u32, (i + 1) % width != 0, i + width < pixels);
+            edges.rows.push(row);
+            edges.incident_rows.push(edges.incident.len() as u32);
+            // Nearest ends first: left, right, up, down.
+            if i % width != 0 {
+                edges.incident.push(edges.rows[i - 1]);
             }
-            if i + width < width * height {
-                ends.push([i as u32, (i + width) as u32]);
+            if right {
+                edges.incident.push(row);
+                edges.ends.push([i as u32, i as u32 + 1]);
+                edges.kinds.push(0);
+            }
+            if i >= width {
+                edges.incident.push(edges.rows[i - width] + u32::from(right));
+            }
+            if down {
+                edges.incident.push(row + u32::from(right));
+                edges.ends.push([i as u32, (i + width) as u32]);
+                edges.kinds.push(1);
             }
         }
-        Self::from_sorted((width, height), ends, vec![(1, 0), (0, 1)])
+        edges.rows.push(edges.ends.len() as u32);
+        edges.incident_rows.push(edges.incident.len() as u32);
+        edges
     }
 
     /// Edges between pairs of pixels, without values; a pair that occurs twice counts once, one of equal pixels not at
@@ -89,11 +109,7 @@ impl Edges {
         let mut ends: Vec<_> = pairs.into_iter().filter(|[a, b]| a != b).map(ordered).collect();
         ends.sort_unstable();
         ends.dedup();
-        Self::from_sorted(size, ends, Vec::new())
-    }
-
-    fn from_sorted((width, height): (usize, usize), ends: Vec<[u32; 2]>, mut offsets: Vec<(i32, i32)>) -> Self {
-        let pixels = width * height;
+        let (width, pixels) = (size.0, size.0 * size.1);
         let rows = starts(pixels, ends.iter().map(|ends| ends[0]));
         let incident_rows = starts(pixels, ends.iter().flatten().copied());
         let mut next = incident_rows.clone();
@@ -107,7 +123,7 @@ impl Edges {
             // Stable, so that of two ends at the same distance the lower one comes first.
             incident[row[0] as usize..row[1] as usize].sort_by_key(distance);
         }
-        let mut kinds = Vec::with_capacity(ends.len());
+        let (mut offsets, mut kinds) = (Vec::new(), Vec::with_capacity(ends.len()));
         let at = |pixel: u32| ((pixel as usize % width) as i32, (pixel as usize / width) as i32);
         for &[lower, higher] in &ends {
             let (from, to) = (at(lower), at(higher));
@@ -202,6 +218,11 @@ mod tests {
             assert_eq!(edges.len(), (width - 1) * height + width * (height - 1), "{width}x{height}");
             assert_eq!(edges.pixels(), width * height);
             assert!(edges.is_cross((width, height)));
+            let pairs = (0..edges.len()).map(|edge| edges.ends(edge));
+            let general = Edges::new((width, height), pairs);
+            let around =
+                |edges: &Edges| (0..width * height).map(|i| edges.around(i).collect()).collect::<Vec<Vec<_>>>();
+            assert!(around(&general) == around(&edges) && general.rows == edges.rows, "{width}x{height}");
             let degrees: usize = (0..edges.pixels()).map(|pixel| edges.around(pixel).count()).sum();
             assert_eq!(degrees, 2 * edges.len());
         }

@@ -2,6 +2,8 @@
 
 use std::borrow::Cow;
 
+use rayon::prelude::*;
+
 use super::layer::Layer;
 use super::{BINS, Cross, EdgeParts, Edges, Provenance, bin_count};
 use crate::error::{Error, Result};
@@ -116,12 +118,12 @@ impl Frame {
         let pair = |layers: [Layer; 2]| Ok::<_, Error>([self.require(layers[0])?, self.require(layers[1])?]);
         let all = |layers| {
             let of_axis = pair(layers)?;
-            Ok::<Vec<Rgb>, Error>((0..edges.len()).map(|edge| values(of_axis, edge)).collect())
+            Ok::<Vec<Rgb>, Error>((0..edges.len()).into_par_iter().map(|edge| values(of_axis, edge)).collect())
         };
         let binned = |layers: [fn(u8) -> Layer; 2]| {
             let bins = (0..BINS as u8).map(|k| pair(layers.map(|layer| layer(k)))).collect::<Result<Vec<_>>>()?;
             let of_edge = |edge| std::array::from_fn(|k| values(bins[k], edge));
-            Ok::<Vec<[Rgb; BINS]>, Error>((0..edges.len()).map(of_edge).collect())
+            Ok::<Vec<[Rgb; BINS]>, Error>((0..edges.len()).into_par_iter().map(of_edge).collect())
         };
         let mean = all([Layer::Dx, Layer::Dy])?;
         let variance = if parts.variance { all([Layer::DxVariance, Layer::DyVariance])? } else { Vec::new() };

@@ -50,8 +50,9 @@ enum Weighting {
     Cross,
 }
 
-/// Bytes held for every pixel besides the frame, an upper bound.
-const BYTES: u64 = 250;
+/// Bytes held for every pixel besides the frame, upper bounds: without and with the bins of cross-weighting.
+const BYTES: u64 = 450;
+const BYTES_WITH_BINS: u64 = 800;
 
 fn make(parameters: &Parameters) -> Result<Box<dyn Reconstruction>> {
     let weights = parameters.choice("weights", &["uniform", "variance", "given"])?;
@@ -77,7 +78,8 @@ impl Reconstruction for ControlVariate {
 
     fn reconstruct(&self, frame: &Frame, context: &Context) -> Result<Solution> {
         let inputs = Inputs::new(frame, 1)?;
-        check_memory(frame, context, METHOD.id, BYTES)?;
+        let bytes = if self.weighting == Weighting::Cross { BYTES_WITH_BINS } else { BYTES };
+        check_memory(frame, context, METHOD.id, bytes)?;
         let edges = frame.edges(EdgeParts {
             variance: self.weighting == Weighting::Variance,
             bins: self.weighting == Weighting::Cross,
@@ -159,32 +161,63 @@ impl Estimate {
     }
 }
 
+/// Pixels that a thread takes at a time.
+const CHUNK: usize = 8192;
+
+/// A neighbour of a pixel, the edge to it, and its weight.
+#[derive(Clone, Copy)]
+struct Neighbour {
+    to: u32,
+    edge: u32,
+    weight: f32,
+}
+
 /// Every pixel's weights of itself and of its neighbours, which add up to one.
+#[derive(Default)]
 struct Stencil {
     own: Vec<f32>,
-    /// First entry of every pixel in `neighbours`, and the number of entries.
+    /// Start of every pixel's entries in `neighbours`, and the end of the last.
     rows: Vec<u32>,
-    neighbours: Vec<(HalfEdge, f32)>,
+    neighbours: Vec<Neighbour>,
 }
 
 impl Stencil {
     /// Normalises the weights of every pixel (`None`) and of its neighbours.
-    fn new(edges: &Edges, weight: impl Fn(usize, Option<HalfEdge>) -> f32) -> Self {
-        let pixels = edges.pixels();
-        let (mut own, mut rows, mut neighbours) =
-            (Vec::with_capacity(pixels), vec![0], Vec::with_capacity(2 * edges.len()));
-        for pixel in 0..pixels {
-            let start = neighbours.len();
-            neighbours.extend(edges.around(pixel).map(|half| (half, weight(pixel, Some(half)))));
-            let row = &mut neighbours[start..];
-            row.sort_by_key(|(half, _)| (half.to.abs_diff(pixel), half.to < pixel));
-            let of_pixel = weight(pixel, None);
-            let total = row.iter().fold(of_pixel, |sum, (_, weight)| sum + weight);
-            row.iter_mut().for_each(|(_, weight)| *weight /= total);
-            own.push(of_pixel / total);
-            rows.push(neighbours.len() as u32);
+    fn new(edges: &Edges, weight: impl Fn(usize, Option<HalfEdge>) -> f32 + Sync) -> Self {
+        let parts: Vec<Self> = (0..edges.pixels().div_ceil(CHUNK))
+            .into_par_iter()
+            .map(|part| {
+                let mut stencil = Self::default();
+                for pixel in part * CHUNK..edges.pixels().min((part + 1) * CHUNK) {
+                    stencil.push(pixel, edges, &weight);
+                }
+                stencil
+            })
+            .collect();
+        let mut all = Self { rows: vec![0], ..Self::default() };
+        for mut part in parts {
+            let before = all.neighbours.len() as u32;
+            all.own.append(&mut part.own);
+            all.neighbours.append(&mut part.neighbours);
+            all.rows.extend(part.rows.iter().map(|end| before + end));
         }
-        Self { own, rows, neighbours }
+        all
+    }
+
+    /// Appends a pixel, and the end of its row.
+    fn push(&mut self, pixel: usize, edges: &Edges, weight: &impl Fn(usize, Option<HalfEdge>) -> f32) {
+        let start = self.neighbours.len();
+        self.neighbours.extend(edges.around(pixel).map(|half| {
+            let HalfEdge { to, edge, .. } = half;
+            Neighbour { to: to as u32, edge: edge as u32, weight: weight(pixel, Some(half)) }
+        }));
+        let row = &mut self.neighbours[start..];
+        row.sort_by_key(|neighbour| (neighbour.to.abs_diff(pixel as u32), neighbour.to < pixel as u32));
+        let of_pixel = weight(pixel, None);
+        let total = row.iter().fold(of_pixel, |sum, neighbour| sum + neighbour.weight);
+        row.iter_mut().for_each(|neighbour| neighbour.weight /= total);
+        self.own.push(of_pixel / total);
+        self.rows.push(self.neighbours.len() as u32);
     }
 
     /// Weights that come with the edges, against one of the pixel itself.
@@ -208,7 +241,7 @@ impl Stencil {
         })
     }
 
-    fn row(&self, pixel: usize) -> &[(HalfEdge, f32)] {
+    fn row(&self, pixel: usize) -> &[Neighbour] {
         &self.neighbours[self.rows[pixel] as usize..self.rows[pixel + 1] as usize]
     }
 
@@ -218,9 +251,10 @@ impl Stencil {
         // The sum of the differences is the same every time.
         let correction = |pixel: usize| {
             let mut sum: Quad = [0.0; 4];
-            for (half, weight) in self.row(pixel) {
-                let weight = -half.sign * weight;
-                (0..3).for_each(|c| sum[c] += weight * estimate.differences[half.edge][c]);
+            for &Neighbour { to, edge, weight } in self.row(pixel) {
+                // Differences lead from the lower pixel to the higher one.
+                let weight = if to as usize > pixel { -weight } else { weight };
+                (0..3).for_each(|c| sum[c] += weight * estimate.differences[edge as usize][c]);
             }
             sum
         };
@@ -228,8 +262,8 @@ impl Stencil {
         let mean = |pixel: usize, from: &[Quad]| {
             let mut sum = corrections[pixel];
             (0..3).for_each(|c| sum[c] += self.own[pixel] * from[pixel][c]);
-            for (half, weight) in self.row(pixel) {
-                (0..3).for_each(|c| sum[c] += weight * from[half.to][c]);
+            for neighbour in self.row(pixel) {
+                (0..3).for_each(|c| sum[c] += neighbour.weight * from[neighbour.to as usize][c]);
             }
             sum
         };

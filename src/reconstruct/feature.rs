@@ -18,7 +18,7 @@ pub const METHOD: Method = Method {
 };
 
 /// Bytes held for every pixel besides the frame, an upper bound.
-const BYTES: u64 = 600;
+const BYTES: u64 = 950;
 
 fn make(parameters: &Parameters) -> Result<Box<dyn Reconstruction>> {
     Ok(Box::new(Feature { options: Options::new(parameters)? }))

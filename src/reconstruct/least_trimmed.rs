@@ -44,7 +44,7 @@ const TRIAL: f64 = 0.05;
 const FINAL: f64 = 1e-3;
 
 /// Bytes held for every pixel besides the frame, an upper bound.
-const BYTES: u64 = 450;
+const BYTES: u64 = 700;
 
 fn make(parameters: &Parameters) -> Result<Box<dyn Reconstruction>> {
     let l1 = parameters.choice("norm", &["l1", "l2"])? == "l1";
