@@ -10,6 +10,7 @@ use fluxion::film::{Layer, Needs};
 use fluxion::metrics::METRICS;
 use fluxion::plan::Plan;
 use fluxion::reconstruct::{self, METHODS, Method};
+use fluxion::reference::fingerprint;
 use fluxion::scene::load::integrator;
 use fluxion::scene::shape::Geometry;
 use fluxion::scene::{Scene, bsdf, emitter, load, sensor, shape, texture};
@@ -128,7 +129,7 @@ fn describe(scene: &Scene, method: &str) -> Result<()> {
         println!("bounds       {} to {}", bounds.lower, bounds.upper);
     }
     println!("hierarchy    Embree {major}.{minor}.{patch}");
-    println!("fingerprint  {:016x}", scene.fingerprint());
+    println!("fingerprint  {}", fingerprint(scene));
     println!("with method {method}:");
     let needs = reconstruct::parse(method)?.needs();
     let plan = Plan::new(scene, needs, Needs::default());

@@ -7,6 +7,7 @@ use fluxion::adaptive::{self, AdaptiveOutcome, AdaptiveSettings, Limits, Start};
 use fluxion::film::{Frame, Needs, Provenance, exr};
 use fluxion::image::io::failed_lookups;
 use fluxion::reconstruct::{Reconstruction, Solution};
+use fluxion::reference::fingerprint;
 use fluxion::render::{self, Budget, Control, RenderOutcome, RenderSettings, SampleId};
 use fluxion::scene::Scene;
 
@@ -159,7 +160,7 @@ impl Job<'_> {
     fn provenance(&self, stats: &Stats) -> Provenance {
         Provenance {
             scene: self.args.scene.file_name().unwrap_or_default().to_string_lossy().into_owned(),
-            fingerprint: format!("{:016x}", self.scene.fingerprint()),
+            fingerprint: fingerprint(self.scene),
             seed: self.args.seed.to_string(),
             spp: stats.spp.to_string(),
             seconds: format!("{:.3}", stats.seconds.render),

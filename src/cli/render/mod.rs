@@ -14,6 +14,7 @@ use fluxion::checkpoint::{Origin, Run, content};
 use fluxion::error::Error;
 use fluxion::film::Needs;
 use fluxion::plan::Plan;
+use fluxion::reference::fingerprint;
 use fluxion::render::{self, RenderOutcome, SHIFTS, SampleId, Shift};
 use fluxion::scene::{Scene, load};
 
@@ -180,7 +181,7 @@ fn origin(args: &Args, scene: &Scene, plan: &Plan) -> Result<Origin> {
         version: env!("CARGO_PKG_VERSION").into(),
         scene: args.scene.file_name().unwrap_or_default().to_string_lossy().into_owned(),
         content: content(scene)?,
-        fingerprint: format!("{:016x}", scene.fingerprint()),
+        fingerprint: fingerprint(scene),
         method: args.method.method.clone(),
         plan: plan.summary(),
         size: (scene.sensor().width, scene.sensor().height),
