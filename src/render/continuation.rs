@@ -35,19 +35,6 @@ pub fn shade(
     next: &mut Paths,
 ) -> Shaded {
     let color = sample_emitters(scene, sampler, depth, packet.hash, vertices);
-    let non_finite = scatter((scene, sampler), depth, packet, vertices, first_index, next);
-    Shaded { color, non_finite }
-}
-
-#[inline(always)]
-fn scatter(
-    (scene, sampler): (&Scene, &Sampler),
-    depth: u32,
-    packet: &Packet,
-    vertices: &mut Vertices,
-    first_index: u32,
-    next: &mut Paths,
-) -> Mask {
     let Vertices { surfaces, materials, scatters, .. } = vertices;
     let numbers = sampler.scatter(packet.hash, depth);
     let choices = (numbers.lobe, numbers.direction);
@@ -85,5 +72,5 @@ fn scatter(
         to.hash.0[slot] = packet.hash.0[lane];
         to.parent.0[slot] = first_index + lane as u32;
     }
-    non_finite
+    Shaded { color, non_finite }
 }

@@ -5,7 +5,7 @@ use super::features;
 use super::gradient::{Shift, ShiftMapping};
 use super::record::PathRecord;
 use super::tracer::PathTracer;
-use crate::film::{Needs, Sample};
+use crate::film::{Differences, Needs, Sample};
 use crate::math::lanes::LANES;
 use crate::math::{Vec2, vec2};
 use crate::scene::Scene;
@@ -35,6 +35,7 @@ impl<'a> Wave<'a> {
         let keep_all = self.shift.as_ref().is_some_and(|shift| shift.needs_vertices());
         self.tracer.trace(&camera, Vec2::ZERO, keep_all, &mut self.record);
         if let Some(shift) = &mut self.shift {
+            self.record.samples.iter_mut().for_each(|sample| sample.differences = Some(Differences::default()));
             shift.shift(&mut self.tracer, &camera, &mut self.record);
         }
         if self.occlusion {

@@ -1,5 +1,5 @@
-//! Shift mappings: maps from the paths of a pixel to paths of its neighbours, and the differences of their contributions. The README beside
-//! this file derives the estimator.
+//! Shift mappings: maps from the paths of a pixel to paths of its neighbours, and the differences of their
+//! contributions. The README beside this file derives the estimator.
 
 pub mod reconnect;
 mod replay;
@@ -15,8 +15,8 @@ pub trait ShiftMapping: Send {
     /// Whether the vertices of base paths have to be recorded.
     fn needs_vertices(&self) -> bool;
 
-    /// Shifts the recorded base paths of a wave and sets their samples' differences: this end's share of every edge, zero
-    /// across the film's border.
+    /// Shifts the recorded base paths of a wave and adds this end's share of every edge to their samples' differences,
+    /// which are zero before, and stay so across the film's border.
     fn shift(&mut self, tracer: &mut PathTracer, camera: &CameraSamples, record: &mut PathRecord);
 }
 

@@ -3,7 +3,7 @@
 //! slower than reconnection.
 
 use super::{ShiftKind, ShiftMapping};
-use crate::film::{CROSS, Differences};
+use crate::film::CROSS;
 use crate::math::vec2;
 use crate::render::camera::CameraSamples;
 use crate::render::record::PathRecord;
@@ -27,7 +27,6 @@ impl ShiftMapping for Replay {
     }
 
     fn shift(&mut self, tracer: &mut PathTracer, camera: &CameraSamples, record: &mut PathRecord) {
-        record.samples.iter_mut().for_each(|sample| sample.differences = Some(Differences::default()));
         for (direction, step) in CROSS.into_iter().enumerate() {
             tracer.trace(camera, vec2(step.0 as f32, step.1 as f32), false, &mut self.neighbours);
             let samples = record.samples.iter_mut().zip(&self.neighbours.samples).zip(camera.pixels);

@@ -22,7 +22,7 @@ use self::offsets::{MISS, OUT_OF_FILM, OffsetSurfaces};
 use self::segment::{NextVertices, OffsetSegment, Scratch, ShiftContext};
 use self::states::{LevelStates, Prefix, States};
 use super::{ShiftKind, ShiftMapping};
-use crate::film::{CROSS, Differences};
+use crate::film::CROSS;
 use crate::math::Rgb;
 use crate::math::lanes::{LANES, Lanes3, Mask};
 use crate::render::camera::CameraSamples;
@@ -63,7 +63,6 @@ impl ShiftMapping for Reconnect {
     }
 
     fn shift(&mut self, tracer: &mut PathTracer, camera: &CameraSamples, record: &mut PathRecord) {
-        record.samples.iter_mut().for_each(|sample| sample.differences = Some(Differences::default()));
         let packets = camera.pixels.len().div_ceil(LANES);
         if self.ambient {
             // The ambient light reaches every vertex.
