@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use fluxion::{Context, exr, parse_method, solve, write_color};
+use fluxion::{Context, Extras, exr, parse_method, solve, write_color};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arguments = std::env::args().skip(1);
@@ -12,8 +12,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     for method in arguments {
         let solution = solve(parse_method(&method)?.as_ref(), &frame, &Context::QUIET)?;
         let name = method.split(':').next().unwrap_or(&method);
-        let error = solution.error.as_ref().map(|error| ("error", error));
-        write_color(Path::new(&format!("{name}.exr")), &solution.image, error.as_slice(), &[])?;
+        let layers = solution.error.as_ref().map(|error| ("error", error)).into_iter().collect();
+        let extras = Extras { layers, ..Extras::default() };
+        write_color(Path::new(&format!("{name}.exr")), &solution.image, &extras)?;
     }
     Ok(())
 }

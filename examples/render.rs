@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use fluxion::{Budget, Context, Control, RenderSettings, load, parse_method, render, solve, write_color};
+use fluxion::{Budget, Context, Control, Extras, RenderSettings, load, parse_method, render, solve, write_color};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -15,7 +15,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let outcome = render(&scene, settings, &Control::QUIET);
     let frame = outcome.film.develop();
     let solution = solve(method.as_ref(), &frame, &Context::QUIET)?;
-    write_color(Path::new(image), &solution.image, &[], &[])?;
+    write_color(Path::new(image), &solution.image, &Extras::default())?;
     println!("{} samples in {:.2} s", outcome.film.samples(), outcome.elapsed.as_secs_f64());
     Ok(())
 }

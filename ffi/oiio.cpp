@@ -66,7 +66,13 @@ extern "C" void *fluxion_image_open(const char *path, FluxionImageSpec *spec, Fl
   spec->channels = found.nchannels;
   spec->x = found.x;
   spec->y = found.y;
-  spec->eight_bit = found.format == OIIO::TypeDesc::UINT8;
+  const bool whole = found.x == found.full_x && found.y == found.full_y && found.width == found.full_width &&
+                     found.height == found.full_height;
+  if (!whole) {
+    spec->full_width = found.full_width;
+    spec->full_height = found.full_height;
+  }
+  std::strncpy(spec->format, image->input->format_name(), sizeof spec->format - 1);
   return image.release();
 } catch (const std::exception &exception) {
   fail(error, exception.what(), "opening the image failed");
@@ -79,6 +85,15 @@ extern "C" void *fluxion_image_open(const char *path, FluxionImageSpec *spec, Fl
 extern "C" const char *fluxion_image_channel(void *handle, int index) {
   const auto &names = static_cast<OpenImage *>(handle)->input->spec().channelnames;
   return index >= 0 && static_cast<size_t>(index) < names.size() ? names[index].c_str() : nullptr;
+}
+
+extern "C" FluxionSampleType fluxion_image_channel_type(void *handle, int index) {
+  const OIIO::ImageSpec &spec = static_cast<OpenImage *>(handle)->input->spec();
+  const OIIO::TypeDesc type = spec.channelformat(index);
+  if (type == OIIO::TypeDesc::UINT8) return FLUXION_UINT8;
+  if (type == OIIO::TypeDesc::UINT16) return FLUXION_UINT16;
+  if (type == OIIO::TypeDesc::UINT32) return FLUXION_UINT32;
+  return type.is_floating_point() ? FLUXION_FLOAT : FLUXION_OTHER;
 }
 
 extern "C" const char *fluxion_image_attribute(void *handle, const char *name) try {
@@ -112,6 +127,17 @@ extern "C" bool fluxion_image_write(const char *path, const FluxionImageSpec *wa
   }
   OIIO::ImageSpec spec(wanted->width, wanted->height, wanted->channels, type_of(kind));
   for (int i = 0; i < wanted->channels; ++i) spec.channelnames[i] = channels[i];
+  for (int i = 0; i < wanted->channels; ++i) {
+    if (spec.channelnames[i] == "A") spec.alpha_channel = i;
+  }
+  // Eight-bit formats have colours without their alpha, and are given them so.
+  if (spec.alpha_channel >= 0 && spec.format == OIIO::TypeDesc::UINT8) spec.attribute("oiio:UnassociatedAlpha", 1);
+  if (wanted->full_width > 0) {
+    spec.x = wanted->x;
+    spec.y = wanted->y;
+    spec.full_width = wanted->full_width;
+    spec.full_height = wanted->full_height;
+  }
   if (compression) spec.attribute("compression", compression);
   for (size_t i = 0; i < attribute_count; ++i) spec.attribute(attributes[i].name, attributes[i].value);
   /* Formats do not look at what comes of their last bytes: on a full disk they would leave a part of a file and call it

@@ -22,9 +22,21 @@ typedef struct FluxionImageSpec {
   /* Upper left corner of the pixels that are there. */
   int x;
   int y;
-  /* Whether every sample is stored in eight bits. */
-  bool eight_bit;
+  /* The whole picture, whose upper left corner is (0, 0); zero when the pixels that are there are all of it. */
+  int full_width;
+  int full_height;
+  /* OpenImageIO's name of the file format. */
+  char format[16];
 } FluxionImageSpec;
+
+/* How the samples of a channel are stored. */
+typedef enum FluxionSampleType {
+  FLUXION_FLOAT,
+  FLUXION_UINT8,
+  FLUXION_UINT16,
+  FLUXION_UINT32,
+  FLUXION_OTHER
+} FluxionSampleType;
 
 typedef struct FluxionAttribute {
   const char *name;
@@ -35,6 +47,7 @@ void *fluxion_image_open(const char *path, FluxionImageSpec *spec, FluxionError 
 /* The strings belong to the open image. Null when there is no such channel or attribute. */
 const char *fluxion_image_channel(void *image, int index);
 const char *fluxion_image_attribute(void *image, const char *name);
+FluxionSampleType fluxion_image_channel_type(void *image, int index);
 /* Fill width * height * channels samples, rows from the top, channels interleaved. */
 bool fluxion_image_read_floats(void *image, float *pixels, FluxionError *error);
 bool fluxion_image_read_bytes(void *image, uint8_t *pixels, FluxionError *error);

@@ -58,7 +58,7 @@ pub mod report;
 pub use self::error::{Error, Result};
 pub use self::film::{Frame, Layer, exr};
 pub use self::image::Image;
-pub use self::image::io::write_color;
+pub use self::image::io::{Extras, write_color};
 pub use self::reconstruct::{Context, Solution, parse as parse_method, solve};
 pub use self::render::{Budget, Control, RenderSettings, render};
 pub use self::scene::Scene;

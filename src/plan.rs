@@ -32,7 +32,7 @@ impl Plan {
             Err(_) if !wanted.ambient => EdgeNeed::KnownZero,
             _ => wanted.edges,
         };
-        let needs = Needs { edges, ..wanted };
+        let needs = Needs { edges, alpha: scene.sensor().wants_alpha(), ..wanted };
         let mut items = of_film(scene, method, saved, needs);
         items.extend(of_scene(scene, needs));
         Self { needs, items }
@@ -87,6 +87,12 @@ fn of_film(scene: &Scene, method: Needs, saved: Needs, needs: Needs) -> Vec<Item
         item("occlusion", needs.occlusion, method.occlusion, saved.occlusion),
         item("position", needs.position, method.position, saved.position),
         item("ambient", needs.ambient, method.ambient, saved.ambient),
+        Item {
+            name: "alpha",
+            computed: needs.alpha,
+            reason: if needs.alpha { "the film's pixel_format has alpha" } else { "the film's pixel_format has none" }
+                .into(),
+        },
     ]
 }
 

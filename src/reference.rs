@@ -140,7 +140,7 @@ impl Reference {
         attributes.push((Provenance::name(FLOOR), format!("{:.3e}", self.floor())));
         let channels = CHANNELS.map(String::from).to_vec();
         let (width, height) = (self.image.width, self.image.height);
-        let pixels = Pixels { width, height, channels, data, eight_bit: false, attributes };
+        let pixels = Pixels { width, height, channels, data, window: None, attributes };
         write(path, &pixels, if half && self.fits_half() { Kind::Half } else { Kind::Float }, Some("zip"))
     }
 

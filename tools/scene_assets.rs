@@ -41,7 +41,7 @@ fn noise(x: f32, y: f32, cells: u64, seed: u64) -> f32 {
 
 fn image(path: &Path, size: usize, pixel: impl Fn(f32, f32) -> Vec3) -> std::result::Result<(), Error> {
     let at = |i: usize| (i as f32 + 0.5) / size as f32;
-    io::write_color(path, &Image::from_rgb(size, size, |x, y| pixel(at(x), at(y))), &[], &[])
+    io::write_color(path, &Image::from_rgb(size, size, |x, y| pixel(at(x), at(y))), &Default::default())
 }
 
 /// Square tiles of uneven colour with dark joints.
@@ -90,7 +90,7 @@ fn sky(path: &Path) -> std::result::Result<(), Error> {
         let distance = (u - 0.3).hypot(0.5 * (v - 0.25));
         base + vec3(60.0, 50.0, 35.0) * (-(distance / 0.02).powi(2)).exp()
     });
-    io::write_color(path, &picture, &[], &[])
+    io::write_color(path, &picture, &Default::default())
 }
 
 /// A torus around the z axis: radius 1 with a tube of radius `tube`.

@@ -82,7 +82,7 @@ impl PreviousPass {
         frame.set(LAYERS[0], first);
         LAYERS[1..].iter().try_for_each(|&layer| images.next().map(|image| frame.set(layer, image)))?;
         let (image, error) = (images.next()?, images.next());
-        Some(Self { frame, solution: Solution { image, error, notes: Vec::new() } })
+        Some(Self { frame, solution: Solution { image, alpha: None, error, notes: Vec::new() } })
     }
 }
 

@@ -75,7 +75,7 @@ impl Store {
         self.results.left_out.retain(|left| !same(left));
         self.results.records.push(record);
         self.save()?;
-        file.map_or(Ok(()), |file| io::write_color(&file, &image, &[], &[]))
+        file.map_or(Ok(()), |file| io::write_color(&file, &image, &io::Extras::default()))
     }
 
     /// Notes that runs were not worth starting, once for all seeds.

@@ -29,7 +29,9 @@ use crate::render::{RenderOutcome, SampleId};
 const MAGIC: [u8; 8] = *b"FLUXCKPT";
 
 /// Version of the format: raised whenever the bytes change their meaning.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
+/// The version before, whose films have no alpha: they have this many statistics.
+const BEFORE: (u32, usize) = (2, 10);
 
 /// Headers longer than this are damaged.
 const MAX_HEADER: u32 = 1 << 20;
@@ -160,8 +162,9 @@ fn read(from: &mut impl Read, length: u64) -> io::Result<Checkpoint> {
         return Err(io::Error::other("is no checkpoint of `fluxion render --checkpoint`"));
     }
     let version = word(from)?;
-    if version != VERSION {
-        let what = format!("is a checkpoint of format {version}; this fluxion reads and writes format {VERSION}");
+    if ![BEFORE.0, VERSION].contains(&version) {
+        let what =
+            format!("is a checkpoint of format {version}; this fluxion reads formats {} and {VERSION}", BEFORE.0);
         return Err(io::Error::other(what));
     }
     let count = word(from)?;
@@ -178,7 +181,10 @@ fn read(from: &mut impl Read, length: u64) -> io::Result<Checkpoint> {
     if least.is_none_or(|least| least as u64 > length) {
         return Err(invalid(format!("its header claims {width}x{height} pixels in {length} bytes")));
     }
-    let film = Film::read((width, height), header.origin.needs, from)?;
+    let film = match version {
+        VERSION => Film::read((width, height), header.origin.needs, from)?,
+        _ => Film::read_statistics((width, height), header.origin.needs, BEFORE.1, from)?,
+    };
     let journal = match header.adaptive {
         Some(adaptive) => Some(journal(adaptive, (width, height), from)?),
         None => None,

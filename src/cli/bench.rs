@@ -13,6 +13,7 @@ use fluxion::reconstruct::{self, METHODS};
 use fluxion::report::{Page, Shown, Summary, View, changes, errors, table};
 
 use super::progress;
+use super::terminal::{note, out};
 
 /// Options of `bench`.
 #[derive(clap::Args)]
@@ -83,7 +84,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         }
         names.push(case.name);
     }
-    let stop = super::stop_on_interrupt()?;
+    let stop = super::interrupt::stop_on_signal()?;
     let bar = progress::bar(args.quiet);
     let total = scenes.len() * methods.len() * budgets.len() * args.seeds as usize;
     let mut done = 0;
@@ -104,17 +105,17 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     store.save()?;
     write_page(args, &store, &scenes, &budgets, baseline.as_ref())?;
     let summary = Summary::new(&store.results, "relmse");
-    print!("{}\nrelMSE within the largest budget:\n\n", table(&summary));
+    out!("{}\nrelMSE within the largest budget:\n", table(&summary))?;
     if let Some(largest) = budgets.iter().max_by(|a, b| a.amount().total_cmp(&b.amount())) {
-        print!("{}", errors(&summary, &largest.to_string()));
+        out!("{}", errors(&summary, &largest.to_string()).trim_end())?;
     }
     warn_of_floors(&store.results);
     if stop.load(Ordering::Relaxed) {
-        eprintln!("warning: stopped early; --resume goes on with what is missing");
+        note!("warning: stopped early; --resume goes on with what is missing");
     }
     let failed: Vec<_> = store.results.left_out.iter().filter(|left| left.reason.starts_with("failed")).collect();
     for left in &failed {
-        eprintln!("error: {} on {}, {}: {}", left.method, left.scene, left.budget, left.reason);
+        note!("error: {} on {}, {}: {}", left.method, left.scene, left.budget, left.reason);
     }
     Ok(if failed.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
@@ -182,7 +183,7 @@ fn reference(args: &Args) -> Option<&Path> {
 /// Fails if a budget is not enough for a single sample of path tracing.
 fn check(case: &Case, budgets: &[Budget]) -> Result<()> {
     if case.truth.floor.is_none() {
-        eprintln!("warning: the reference of {} does not say what scene it is of, nor how noisy it is", case.name);
+        note!("warning: the reference of {} does not say what scene it is of, nor how noisy it is", case.name);
     }
     let least = budgets.iter().filter_map(|budget| match budget {
         Budget::Seconds(seconds) => Some(*seconds),
@@ -229,7 +230,7 @@ fn write_page(
     let certain = changes.iter().filter(|change| change.verdict != 0);
     for change in certain {
         let word = if change.verdict < 0 { "better" } else { "worse" };
-        println!("{word}: {} on {}, {}: {:.3} of the error", change.method, change.scene, change.budget, change.ratio);
+        out!("{word}: {} on {}, {}: {:.3} of the error", change.method, change.scene, change.budget, change.ratio)?;
     }
     let page = Page { title: "Error against run time".into(), results: Some(&store.results), changes, views };
     Ok(store.write("index.html", &page.html()?)?)
@@ -246,7 +247,7 @@ fn warn_of_floors(results: &Results) {
         let least = errors.fold(f64::INFINITY, f64::min);
         let floor = own.filter_map(|record| record.floor).next().unwrap_or(0.0);
         if floor > FLOOR_SHARE * least {
-            eprintln!(
+            note!(
                 "warning: the reference of {scene} has a relMSE of {floor:.1e} itself, {:.0} % of the smallest error; \
                  `fluxion reference` can continue it",
                 100.0 * floor / least

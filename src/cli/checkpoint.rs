@@ -12,6 +12,7 @@ use fluxion::ffi::memory::say_what_is_kept;
 use fluxion::render::{self, RenderOutcome};
 
 use super::progress;
+use super::terminal::note;
 
 /// Options of checkpoints.
 #[derive(clap::Args)]
@@ -136,7 +137,7 @@ impl render::CheckpointSink for CheckpointWriter<'_> {
     fn save(&self, outcome: &RenderOutcome) {
         let failed = self.write(outcome).err();
         if let Some(error) = &failed {
-            eprintln!("warning: no new checkpoint: {error}");
+            note!("warning: no new checkpoint: {error}");
         }
         self.state().failed = failed;
     }

@@ -10,7 +10,8 @@ use fluxion::image::{Image, io};
 use fluxion::metrics::{self, METRICS};
 use fluxion::report::{Page, Shown, View, heat};
 
-use super::outputs::Claims;
+use super::outputs::{Claims, write_json};
+use super::terminal::out;
 
 /// Options of `compare`.
 #[derive(clap::Args)]
@@ -42,10 +43,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let images = paths.iter().map(|path| io::read_color(path)).collect::<Result<Vec<_>, _>>()?;
     let reference = io::read_color(reference)?;
     let maps: Vec<_> = args.map.iter().cloned().collect();
-    let to_stdout = args.json.as_ref().is_some_and(|path| path.as_os_str() == "-");
-    let json_file = args.json.clone().filter(|_| !to_stdout);
     let inputs: Vec<_> = args.images.iter().map(PathBuf::as_path).collect();
-    let _claims = Claims::new(&maps, &[&json_file, &args.html], &inputs)?;
+    let _claims = Claims::new(&maps, &[&args.json, &args.html], &inputs)?;
     let mut objects = Vec::new();
     for (path, image) in paths.iter().zip(&images) {
         let mut object = serde_json::Map::new();
@@ -61,20 +60,12 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     if let Some(path) = &args.map {
         let map = metric.measure(&images[0], &reference)?.map;
         let map = map.ok_or_else(|| Error::Usage(format!("metric `{}` has no map", args.metric)))?;
-        io::write_color(path, &heat(&map, None), &[], &[])?;
+        io::write_color(path, &heat(&map, None), &io::Extras::default())?;
     }
-    match (&json_file, to_stdout) {
-        (None, false) => objects.iter().zip(paths).for_each(|(object, path)| print(object, path)),
-        (file, _) => {
-            let text = match objects.as_slice() {
-                [object] => serde_json::to_string_pretty(object)?,
-                all => serde_json::to_string_pretty(all)?,
-            };
-            match file {
-                Some(path) => files::write(path, &(text + "\n"))?,
-                None => println!("{text}"),
-            }
-        }
+    match (&args.json, objects.as_slice()) {
+        (None, objects) => objects.iter().zip(paths).try_for_each(|(object, path)| print(object, path))?,
+        (Some(path), [object]) => write_json(path, object)?,
+        (Some(path), all) => write_json(path, &all)?,
     }
     if let Some(path) = &args.html {
         files::write(path, &page(paths, images, reference)?)?;
@@ -82,14 +73,15 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn print(object: &serde_json::Map<String, serde_json::Value>, path: &Path) {
+fn print(object: &serde_json::Map<String, serde_json::Value>, path: &Path) -> Result<()> {
     if object.contains_key("image") {
-        println!("{}", path.display());
+        out!("{}", path.display())?;
     }
     for metric in METRICS {
         let value = object[metric.id].as_f64().unwrap_or(f64::NAN);
-        println!("{:>10}  {value:<12.6}  {}", metric.id, metric.summary);
+        out!("{:>10}  {value:<12.6}  {}", metric.id, metric.summary)?;
     }
+    Ok(())
 }
 
 fn page(paths: &[PathBuf], images: Vec<Image>, reference: Image) -> Result<String, Error> {

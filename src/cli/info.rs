@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use super::terminal::out;
 use anyhow::{Result, bail};
 use fluxion::adaptive::ALLOCATORS;
 use fluxion::error::Error;
@@ -35,29 +36,28 @@ pub struct Args {
     /// List the metrics
     #[arg(long)]
     metrics: bool,
-    /// Value of a scene parameter, over its <default>
-    #[arg(short = 'D', value_parser = super::parse_definition, value_name = "NAME=VALUE")]
-    define: Vec<(String, String)>,
+    #[command(flatten)]
+    options: super::scene::Args,
 }
 
 /// Prints the requested lists.
 pub fn run(args: &Args) -> Result<ExitCode> {
     if args.methods {
-        methods();
+        methods()?;
     }
     if args.layers {
-        layers();
+        layers()?;
     }
     if args.plugins {
-        plugins();
+        plugins()?;
     }
     if args.metrics {
-        METRICS.iter().for_each(|metric| println!("{:>10}  {}", metric.id, metric.summary));
+        METRICS.iter().try_for_each(|metric| out!("{:>10}  {}", metric.id, metric.summary))?;
     }
     match &args.scene {
         Some(path) => {
-            let options = load::Options { parameters: args.define.clone(), ..load::Options::default() };
-            describe(&load::load(path, &options)?, &args.method)?;
+            let options = load::Options { sensor_optional: true, ..args.options.options() };
+            describe(&super::scene::load(path, &options)?, &args.method)?;
         }
         None if !(args.methods || args.layers || args.plugins || args.metrics) => {
             bail!(Error::Usage("give a scene file, or one of --methods, --layers, --plugins, --metrics".into()));
@@ -67,42 +67,43 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn methods() {
+fn methods() -> Result<()> {
     for method in METHODS {
-        println!("{}  {}", method.id, method.summary);
+        out!("{}  {}", method.id, method.summary)?;
         for parameter in method.parameters {
-            println!("    {}={}  {}", parameter.name, parameter.default, parameter.summary);
+            out!("    {}={}  {}", parameter.name, parameter.default, parameter.summary)?;
         }
     }
     let estimates = |method: &&Method| reconstruct::parse(method.id).is_ok_and(|made| made.estimates_error());
     let names: Vec<_> = METHODS.iter().filter(estimates).map(|method| method.id).collect();
-    println!("\nof which {} estimate their error, for --adaptive and --target-error", names.join(", "));
-    println!("\nallocators of --adaptive:");
-    ALLOCATORS.iter().for_each(|allocator| println!("    {}  {}", allocator.id(), allocator.summary()));
+    out!("\nof which {} estimate their error, for --adaptive and --target-error", names.join(", "))?;
+    out!("\nallocators of --adaptive:")?;
+    ALLOCATORS.iter().try_for_each(|allocator| out!("    {}  {}", allocator.id(), allocator.summary()))
 }
 
-fn layers() {
-    println!("| channels | unit | range | recorded with | what |\n|---|---|---|---|---|");
+fn layers() -> Result<()> {
+    out!("| channels | unit | range | recorded with | what |\n|---|---|---|---|---|")?;
     for layer in Layer::all().filter(|layer| layer.bin_number().unwrap_or(0) == 0) {
         let info = layer.info();
         let names = layer.channel_names().iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(" ");
-        println!("| {names} | {} | {} | {} | {} |", info.unit, info.range, info.flag, info.summary);
+        out!("| {names} | {} | {} | {} | {} |", info.unit, info.range, info.flag, info.summary)?;
     }
+    Ok(())
 }
 
-fn plugins() {
-    println!("| element | type | parameters |\n|---|---|---|");
-    let row = |class: &str, name: &str, parameters: &str| println!("| {class} | `{name}` | {parameters} |");
-    shape::PLUGINS.iter().for_each(|plugin| row("shape", plugin.name, plugin.parameters));
-    load::CONTAINERS.iter().for_each(|(name, parameters)| row("shape", name, parameters));
-    bsdf::PLUGINS.iter().for_each(|plugin| row("bsdf", plugin.name, plugin.parameters));
-    texture::PLUGINS.iter().for_each(|plugin| row("texture", plugin.name, plugin.parameters));
-    row("emitter", "area", "radiance (in a shape)");
-    emitter::PLUGINS.iter().for_each(|plugin| row("emitter", plugin.name, plugin.parameters));
-    sensor::PLUGINS.iter().for_each(|(name, parameters)| row("sensor", name, parameters));
-    integrator::PLUGINS.iter().for_each(|(name, parameters)| row("integrator", name, parameters));
-    println!("\n| left out | type | why, or what to do |\n|---|---|---|");
-    load::UNSUPPORTED.iter().for_each(|(class, name, reason)| row(class, name, reason));
+fn plugins() -> Result<()> {
+    out!("| element | type | parameters |\n|---|---|---|")?;
+    let row = |class: &str, name: &str, parameters: &str| out!("| {class} | `{name}` | {parameters} |");
+    shape::PLUGINS.iter().try_for_each(|plugin| row("shape", plugin.name, plugin.parameters))?;
+    load::CONTAINERS.iter().try_for_each(|(name, parameters)| row("shape", name, parameters))?;
+    bsdf::PLUGINS.iter().try_for_each(|plugin| row("bsdf", plugin.name, plugin.parameters))?;
+    texture::PLUGINS.iter().try_for_each(|plugin| row("texture", plugin.name, plugin.parameters))?;
+    row("emitter", "area", "radiance (in a shape)")?;
+    emitter::PLUGINS.iter().try_for_each(|plugin| row("emitter", plugin.name, plugin.parameters))?;
+    sensor::PLUGINS.iter().try_for_each(|(name, parameters)| row("sensor", name, parameters))?;
+    integrator::PLUGINS.iter().try_for_each(|(name, parameters)| row("integrator", name, parameters))?;
+    out!("\n| left out | type | why, or what to do |\n|---|---|---|")?;
+    load::UNSUPPORTED.iter().try_for_each(|(class, name, reason)| row(class, name, reason))
 }
 
 fn describe(scene: &Scene, method: &str) -> Result<()> {
@@ -117,26 +118,33 @@ fn describe(scene: &Scene, method: &str) -> Result<()> {
     let (sensor, integrator) = (scene.sensor(), scene.integrator());
     let depth = if integrator.max_depth == u32::MAX { "unbounded".into() } else { integrator.max_depth.to_string() };
     let (major, minor, patch) = scene.embree_version();
-    println!("film         {}x{}, {} spp", sensor.width, sensor.height, sensor.spp);
-    println!("paths        depth {depth}, Russian roulette from {}", integrator.rr_depth);
-    println!("shapes       {meshes} meshes with {triangles} triangles, {others} others");
+    for (number, sensor) in scene.sensors().iter().enumerate() {
+        let id = sensor.id.as_ref().map_or(String::new(), |id| format!(" `{id}`"));
+        out!("sensor {number:<5} {}{id}", sensor.plugin)?;
+    }
+    match scene.sensors().is_empty() {
+        true => out!("sensor       none: the scene cannot be rendered")?,
+        false => out!("film         {}x{}, {} spp", sensor.width, sensor.height, sensor.spp)?,
+    }
+    out!("paths        depth {depth}, Russian roulette from {}", integrator.rr_depth)?;
+    out!("shapes       {meshes} meshes with {triangles} triangles, {others} others")?;
     let mut names: Vec<_> = scene.emitters().iter().map(|emitter| emitter.name()).collect();
     names.sort_unstable();
     names.dedup();
-    println!("emitters     {} ({})", scene.emitters().len(), names.join(", "));
+    out!("emitters     {} ({})", scene.emitters().len(), names.join(", "))?;
     let bounds = scene.bounds();
     if !bounds.is_empty() {
-        println!("bounds       {} to {}", bounds.lower, bounds.upper);
+        out!("bounds       {} to {}", bounds.lower, bounds.upper)?;
     }
-    println!("hierarchy    Embree {major}.{minor}.{patch}");
-    println!("fingerprint  {}", fingerprint(scene));
-    println!("with method {method}:");
+    out!("hierarchy    Embree {major}.{minor}.{patch}")?;
+    out!("fingerprint  {}", fingerprint(scene))?;
+    out!("with method {method}:")?;
     let needs = reconstruct::parse(method)?.needs();
     let plan = Plan::new(scene, needs, Needs::default());
-    println!("  film         {} bytes a pixel, 24 more where the camera sees an emitter", plan.needs.bytes_per_pixel());
+    out!("  film         {} bytes a pixel, 24 more where the camera sees an emitter", plan.needs.bytes_per_pixel())?;
     for item in plan.items {
         let verb = if item.computed { "computed" } else { "left out" };
-        println!("  {:<12} {verb}: {}", item.name, item.reason);
+        out!("  {:<12} {verb}: {}", item.name, item.reason)?;
     }
     Ok(())
 }

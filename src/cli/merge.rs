@@ -9,6 +9,7 @@ use fluxion::error::Error;
 use fluxion::film::exr;
 
 use super::outputs::Claims;
+use super::terminal::out;
 
 /// Options of `merge`.
 #[derive(clap::Args)]
@@ -43,6 +44,6 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         checkpoint::save(&args.output, &all.origin, &all.outcome, None)?;
     }
     let spp = all.outcome.film.samples() as f64 / (all.origin.size.0 * all.origin.size.1) as f64;
-    println!("{}: {spp:.1} samples per pixel of {} runs", args.output.display(), all.origin.runs.len());
+    out!("{}: {spp:.1} samples per pixel of {} runs", args.output.display(), all.origin.runs.len())?;
     Ok(ExitCode::SUCCESS)
 }

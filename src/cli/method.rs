@@ -5,11 +5,12 @@ use std::time::Instant;
 
 use anyhow::{Context as _, Result, bail};
 use fluxion::film::{Frame, Layer};
-use fluxion::image::io;
+use fluxion::image::io::{self, Extras};
 use fluxion::reconstruct::{self, Context, Reconstruction, Solution};
 
 use super::progress;
 use super::stats::Stats;
+use super::terminal::note;
 
 /// Options of the reconstruction.
 #[derive(clap::Args)]
@@ -20,6 +21,9 @@ pub struct Args {
     /// Megabytes that the reconstruction may use besides the layers; the image is the same
     #[arg(long, value_name = "MB", value_parser = clap::value_parser!(u64).range(1..1 << 40))]
     max_memory: Option<u64>,
+    /// Exposure of png and jpg images, in powers of two: 1 makes them twice as bright
+    #[arg(long, default_value_t = 0.0, value_name = "EV", allow_negative_numbers = true)]
+    exposure: f32,
     /// Folder for the intermediate images of the method, as EXR files
     #[arg(long, value_name = "DIR")]
     notes: Option<PathBuf>,
@@ -65,15 +69,12 @@ impl Args {
     pub fn write_notes(&self, solution: &Solution, frame: &Frame) -> Result<()> {
         if let Some(folder) = &self.notes {
             if solution.notes.is_empty() {
-                eprintln!("warning: the method {} has no intermediate images", self.method);
+                note!("warning: the method {} has no intermediate images", self.method);
             }
             for note in &solution.notes {
-                io::write_color(
-                    &folder.join(format!("{}.exr", note.name)),
-                    &note.image,
-                    &[],
-                    &frame.provenance.attributes(),
-                )?;
+                let attributes = frame.provenance.attributes();
+                let extras = Extras { attributes, window: frame.window, ..Extras::default() };
+                io::write_color(&folder.join(format!("{}.exr", note.name)), &note.image, &extras)?;
             }
         }
         Ok(())
@@ -82,12 +83,18 @@ impl Args {
 
 /// Writes the image to every output, with estimated error and sample counts where the format has layers, and takes the
 /// time. If it cannot be written anywhere, it goes to the folder for temporary files.
-pub fn write(outputs: &[PathBuf], solution: &Solution, frame: &Frame, stats: &mut Stats) -> Result<()> {
+pub fn write(args: &Args, outputs: &[PathBuf], solution: &Solution, frame: &Frame, stats: &mut Stats) -> Result<()> {
     let start = Instant::now();
     let error = solution.error.as_ref().map(|error| ("error", error));
     let samples = frame.get(Layer::Samples).map(|samples| ("samples", samples));
-    let layers: Vec<_> = error.into_iter().chain(samples).collect();
-    let put = |path: &Path| io::write_color(path, &solution.image, &layers, &frame.provenance.attributes());
+    let extras = Extras {
+        alpha: solution.alpha.as_ref().or(frame.get(Layer::Alpha)),
+        layers: error.into_iter().chain(samples).collect(),
+        attributes: frame.provenance.attributes(),
+        window: frame.window,
+        exposure: args.exposure,
+    };
+    let put = |path: &Path| io::write_color(path, &solution.image, &extras);
     let (mut written, mut failed) = (Vec::new(), Vec::new());
     for path in outputs {
         match put(path) {

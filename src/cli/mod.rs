@@ -4,6 +4,7 @@ mod bench;
 mod checkpoint;
 mod compare;
 mod info;
+mod interrupt;
 mod merge;
 mod method;
 mod outputs;
@@ -11,13 +12,13 @@ mod progress;
 mod reconstruct;
 mod reference;
 mod render;
+mod scene;
 mod stats;
 mod stress;
+pub mod terminal;
 mod validate;
 
 use std::process::ExitCode;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use anyhow::Result;
@@ -53,9 +54,10 @@ enum Command {
     Validate(validate::Args),
 }
 
-/// Runs a command. The exit code is 1 for a check that failed; errors are the caller's to print.
+/// Runs a command. The exit code is 1 for a check that failed, 128 and the number of a signal for work that one has
+/// stopped; errors are the caller's to print.
 pub fn run(args: Args) -> Result<ExitCode> {
-    match args.command {
+    let code = match args.command {
         Command::Render(args) => render::run(&args),
         Command::Reconstruct(args) => reconstruct::run(&args),
         Command::Compare(args) => compare::run(&args),
@@ -65,7 +67,8 @@ pub fn run(args: Args) -> Result<ExitCode> {
         Command::Info(args) => info::run(&args),
         Command::Stress(args) => stress::run(&args),
         Command::Validate(args) => validate::run(&args),
-    }
+    }?;
+    Ok(interrupt::stopped().unwrap_or(code))
 }
 
 /// `WxH` as two positive numbers.
@@ -98,20 +101,6 @@ fn parse_time(text: &str) -> Result<Duration, String> {
 fn parse_definition(text: &str) -> Result<(String, String), String> {
     let (name, value) = text.split_once('=').ok_or("a definition is written NAME=VALUE")?;
     Ok((name.to_owned(), value.to_owned()))
-}
-
-/// A flag that the first interrupt sets; the second ends the program.
-fn stop_on_interrupt() -> Result<Arc<AtomicBool>> {
-    let stop = Arc::new(AtomicBool::new(false));
-    let handler = Arc::clone(&stop);
-    ctrlc::set_handler(move || {
-        // The second time it is meant.
-        if handler.swap(true, Ordering::Relaxed) {
-            std::process::exit(130);
-        }
-        eprintln!("\nstopping after the running tiles; once more ends at once");
-    })?;
-    Ok(stop)
 }
 
 /// Makes all parallel work use this many threads (0: one per core).

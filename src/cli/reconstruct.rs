@@ -17,7 +17,7 @@ use super::stats::Stats;
 pub struct Args {
     /// EXR file written by `fluxion render --layers`, or a checkpoint
     layers: PathBuf,
-    /// Image to write, by its extension: exr, hdr, png or jpg; may be given several times
+    /// Image to write, by its extension: exr, hdr, pfm, tiff, png or jpg; may be given several times
     #[arg(short, long, required = true, value_name = "FILE")]
     output: Vec<PathBuf>,
     #[command(flatten)]
@@ -25,7 +25,7 @@ pub struct Args {
     /// Threads to work with (0: one per core)
     #[arg(long, default_value_t = 0)]
     threads: usize,
-    /// JSON file for times and memory
+    /// JSON file for times and memory; - is standard output
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
     /// Show no progress
@@ -52,7 +52,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     (stats.samples, stats.rejected) = (sum(Layer::Samples) as u64, sum(Layer::Rejected) as u64);
     let solution = args.method.solve(method.as_ref(), &frame, args.quiet, &mut stats)?;
     frame.provenance.method.clone_from(&args.method.method);
-    method::write(&args.output, &solution, &frame, &mut stats)?;
+    method::write(&args.method, &args.output, &solution, &frame, &mut stats)?;
     if let Some(path) = &args.json {
         stats.save(path)?;
     }

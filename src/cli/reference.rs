@@ -8,10 +8,10 @@ use anyhow::{Result, bail};
 use fluxion::error::Error;
 use fluxion::reference::{Reference, SEED, check};
 use fluxion::render::Control;
-use fluxion::scene::load;
 
 use super::outputs::Claims;
 use super::progress;
+use super::terminal::{note, out};
 
 /// Options of `reference`.
 #[derive(clap::Args)]
@@ -30,9 +30,8 @@ pub struct Args {
     /// Stop at so many samples per pixel
     #[arg(long, value_parser = clap::value_parser!(u32).range(2..1 << 30))]
     spp: Option<u32>,
-    /// Film size in place of the scene's, as in 640x360
-    #[arg(long, value_parser = super::parse_size, value_name = "WxH")]
-    size: Option<(usize, usize)>,
+    #[command(flatten)]
+    options: super::scene::Args,
     /// Store half floats; continuing from these loses some precision
     #[arg(long)]
     half: bool,
@@ -42,9 +41,6 @@ pub struct Args {
     /// Threads to work with (0: one per core)
     #[arg(long, default_value_t = 0)]
     threads: usize,
-    /// Value of a scene parameter, over its <default>
-    #[arg(short = 'D', value_parser = super::parse_definition, value_name = "NAME=VALUE")]
-    define: Vec<(String, String)>,
     /// Show no progress
     #[arg(short, long)]
     quiet: bool,
@@ -64,8 +60,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     }
     let _claims = Claims::new(std::slice::from_ref(&args.output), &[], &[&args.scene])?;
     let before = if there { Some(Reference::load(&args.output)?) } else { None };
-    let options = load::Options { parameters: args.define.clone(), size: args.size, ..load::Options::default() };
-    let scene = load::load(&args.scene, &options)?;
+    let scene = super::scene::load(&args.scene, &args.options.options())?;
     let mut reference = match before {
         Some(before) => {
             check(&before.fingerprint, &args.output, &scene)?;
@@ -74,7 +69,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         }
         None => Reference::new(&scene, args.seed),
     };
-    let stop = super::stop_on_interrupt()?;
+    let stop = super::interrupt::stop_on_signal()?;
     let bar = progress::bar(args.quiet);
     while let Some(spp) = next_wave(args, &reference) {
         bar.set_message(format!("{} spp, floor {:.1e}, next wave", reference.spp, reference.floor()));
@@ -90,18 +85,18 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         reference.save(&args.output, args.half)?;
     }
     if args.half && !reference.fits_half() {
-        eprintln!("warning: the brightest values do not fit into half floats: these are floats");
+        note!("warning: the brightest values do not fit into half floats: these are floats");
     }
     if reference.spp == 0 {
         bail!("stopped before the first wave was done");
     }
-    println!(
+    out!(
         "{}: {} spp in {}, relMSE floor {:.1e}",
         args.output.display(),
         reference.spp,
         progress::seconds(Duration::from_secs_f64(reference.seconds)),
         reference.floor()
-    );
+    )?;
     Ok(ExitCode::SUCCESS)
 }
 

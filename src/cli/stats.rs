@@ -4,9 +4,10 @@ use std::path::Path;
 
 use anyhow::Result;
 use fluxion::adaptive::Pass;
-use fluxion::files;
 use fluxion::render::RenderOutcome;
 use serde::Serialize;
+
+use super::outputs::write_json;
 
 /// Wall-clock seconds of the stages.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
@@ -57,7 +58,6 @@ impl Stats {
     /// Writes the object, with the peak memory as it is now.
     pub fn save(&mut self, path: &Path) -> Result<()> {
         self.peak_bytes = fluxion::bench::peak_bytes();
-        let text = serde_json::to_string_pretty(self)?;
-        Ok(files::write(path, text + "\n")?)
+        write_json(path, self)
     }
 }

@@ -4,6 +4,8 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
 
+use super::outputs::{Claims, write_json};
+use super::terminal::out;
 use anyhow::{Result, bail};
 use fluxion::error::Error;
 use fluxion::files;
@@ -22,7 +24,7 @@ pub struct Args {
     /// List the cases and try none
     #[arg(long)]
     list: bool,
-    /// JSON file for all figures
+    /// JSON file for all figures; - is standard output
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
     /// Page for all figures
@@ -42,20 +44,20 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         bail!(Error::Usage(format!("no case has {} in its name; --list shows all", args.filter.join(" or "))));
     }
     if args.list {
-        chosen.iter().for_each(|case| println!("{:<20} {}", case.name, case.summary));
+        chosen.iter().try_for_each(|case| out!("{:<20} {}", case.name, case.summary))?;
         return Ok(ExitCode::SUCCESS);
     }
-    [&args.json, &args.html].into_iter().flatten().try_for_each(|path| files::claim(path))?;
+    let _claims = Claims::new(&[], &[&args.json, &args.html], &[])?;
     let mut rows = Vec::new();
     for case in chosen {
         let start = Instant::now();
         let checks = case.check();
         let row = Row { name: case.name, summary: case.summary, seconds: start.elapsed().as_secs_f64(), checks };
-        print(&row, args.verbose);
+        print(&row, args.verbose)?;
         rows.push(row);
     }
     if let Some(path) = &args.json {
-        files::write(path, serde_json::to_string_pretty(&rows)? + "\n")?;
+        write_json(path, &rows)?;
     }
     if let Some(path) = &args.html {
         files::write(path, page(&rows))?;
@@ -63,25 +65,26 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let (passed, checks) =
         (rows.iter().filter(|row| row.checks.passed()).count(), rows.iter().map(|row| row.checks.list.len()));
     let seconds: f64 = rows.iter().map(|row| row.seconds).sum();
-    println!("{passed} of {} cases passed, {} figures, {seconds:.0} s", rows.len(), checks.sum::<usize>());
+    out!("{passed} of {} cases passed, {} figures, {seconds:.0} s", rows.len(), checks.sum::<usize>())?;
     Ok(if passed == rows.len() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
 /// A line for each kind of figure: the one that is nearest to its bound, or beyond.
-fn print(row: &Row, verbose: bool) {
+fn print(row: &Row, verbose: bool) -> Result<()> {
     let mark = if row.checks.passed() { "ok" } else { "FAILED" };
-    println!("{:<20} {mark:<6} {:>6.1} s  {}", row.name, row.seconds, row.summary);
+    out!("{:<20} {mark:<6} {:>6.1} s  {}", row.name, row.seconds, row.summary)?;
     let line = |check: &Check| {
         let mark = if check.passed() { ' ' } else { '!' };
-        println!("  {mark} {:>9.1e} <= {:<7.0e} {}: {}", check.value, check.bound, check.measure, check.subject);
+        out!("  {mark} {:>9.1e} <= {:<7.0e} {}: {}", check.value, check.bound, check.measure, check.subject)
     };
     if verbose {
-        row.checks.list.iter().for_each(line);
+        row.checks.list.iter().try_for_each(line)?;
     } else {
-        row.worst().iter().for_each(|check| line(check));
-        row.checks.list.iter().filter(|check| !check.passed()).for_each(line);
+        row.worst().iter().try_for_each(|check| line(check))?;
+        row.checks.list.iter().filter(|check| !check.passed()).try_for_each(line)?;
     }
     if let Some(failed) = &row.checks.failed {
-        println!("  ! {failed}");
+        out!("  ! {failed}")?;
     }
+    Ok(())
 }

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use super::terminal::out;
 use anyhow::{Context, Result, bail};
 use fluxion::error::Error;
 use fluxion::validate::{self, Verdict};
@@ -30,20 +31,20 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     if folders.is_empty() {
         bail!(Error::Usage("there is no folder with a scene.xml below scenes/; name one".into()));
     }
-    println!("{:<28} {:>9} {:>9} {:>9} {:>7} {:>9}", "scene", "mean R", "mean G", "mean B", "z rms", "|z| > 4");
+    out!("{:<28} {:>9} {:>9} {:>9} {:>7} {:>9}", "scene", "mean R", "mean G", "mean B", "z rms", "|z| > 4")?;
     let mut failed = 0;
     for folder in &folders {
         let verdict = validate::check(folder, args.spp, args.seed)?;
         let Verdict { mean_ratio: [r, g, b], z_rms, outliers, passed } = verdict;
         let mark = if passed { "" } else { "  FAILED" };
-        println!(
+        out!(
             "{:<28} {r:>9.4} {g:>9.4} {b:>9.4} {z_rms:>7.3} {:>8.3}%{mark}",
             folder.display().to_string(),
             100.0 * outliers
-        );
+        )?;
         failed += usize::from(!passed);
     }
-    println!("{} of {} scenes agree with their references", folders.len() - failed, folders.len());
+    out!("{} of {} scenes agree with their references", folders.len() - failed, folders.len())?;
     Ok(if failed == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 

@@ -30,6 +30,26 @@ impl Kind {
     }
 }
 
+/// How the samples of a channel are stored.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Storage {
+    /// Floats of any size.
+    Float,
+    /// Integers of so many bits, read as shares of the largest.
+    Unsigned(u32),
+    /// Signed integers and other types that pictures rarely have.
+    Other,
+}
+
+/// Position of an image in a larger picture, of which it is a part.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct DataWindow {
+    /// Column and row of its first pixel.
+    pub origin: (usize, usize),
+    /// Width and height of the whole picture.
+    pub full: (usize, usize),
+}
+
 /// Pixels as files hold them: rows from the top, channels interleaved in the order of `channels`.
 #[derive(Clone, Debug, Default)]
 pub struct Pixels {
@@ -41,8 +61,8 @@ pub struct Pixels {
     pub channels: Vec<String>,
     /// `width * height * channels.len()` samples.
     pub data: Vec<f32>,
-    /// Whether the file holds eight bits a sample; `data` is then a multiple of 1/255.
-    pub eight_bit: bool,
+    /// The larger picture that the pixels are a part of, if they are. Only exr files keep it.
+    pub window: Option<DataWindow>,
     /// Named strings of the file's header that were asked for, or that are to be written.
     pub attributes: Vec<(String, String)>,
 }
@@ -63,8 +83,12 @@ pub struct ImageFile<'a> {
     pub origin: (i32, i32),
     /// Channel names, in the order of the file.
     pub channels: Vec<String>,
-    /// Whether the file holds eight bits a sample.
-    pub eight_bit: bool,
+    /// How each channel is stored.
+    pub storage: Vec<Storage>,
+    /// The larger picture that it is a part of, if it is.
+    pub window: Option<DataWindow>,
+    /// OpenImageIO's name of the format, as in `openexr`.
+    pub format: String,
     path: &'a Path,
     handle: *mut c_void,
 }
@@ -114,18 +138,44 @@ impl<'a> ImageFile<'a> {
             return Err(Error::io(path, message(&error)));
         }
         let [width, height] = [spec.width, spec.height].map(|n| usize::try_from(n).unwrap_or(0));
-        let (origin, eight_bit) = ((spec.x, spec.y), spec.eight_bit);
-        let mut file = Self { width, height, origin, channels: Vec::new(), eight_bit, path, handle };
+        let unsigned = |n: i32| usize::try_from(n).ok();
+        let window = [spec.x, spec.y, spec.full_width, spec.full_height].map(unsigned);
+        let window = match window {
+            [Some(x), Some(y), Some(w), Some(h)] if w > 0 => Some(DataWindow { origin: (x, y), full: (w, h) }),
+            _ => None,
+        };
+        // SAFETY: the array ends in a zero, since the other side copies at most all but one of its bytes.
+        let format = unsafe { owned(spec.format.as_ptr()) }.unwrap_or_default();
+        let (origin, channels, storage) = ((spec.x, spec.y), Vec::new(), Vec::new());
+        let mut file = Self { width, height, origin, channels, storage, window, format, path, handle };
         file.channels = (0..spec.channels)
             // SAFETY: the handle is open; the string lives as long.
             .map(|index| unsafe { owned(raw::fluxion_image_channel(handle, index)) }.unwrap_or_default())
             .collect();
+        file.storage = (0..spec.channels).map(|index| file.storage_of(index)).collect();
         let samples = file.samples();
         if samples == 0 || samples > MAX_SAMPLES.min(bytes.saturating_mul(MAX_SAMPLES_PER_BYTE)) {
             let what = format!("the header claims {width}x{height} pixels of {} channels", spec.channels);
             return Err(Error::io(path, what));
         }
         Ok(file)
+    }
+
+    fn storage_of(&self, index: i32) -> Storage {
+        use raw::FluxionSampleType as Type;
+        // SAFETY: the handle is open, and the index is that of a channel.
+        match unsafe { raw::fluxion_image_channel_type(self.handle, index) } {
+            Type::FLUXION_FLOAT => Storage::Float,
+            Type::FLUXION_UINT8 => Storage::Unsigned(8),
+            Type::FLUXION_UINT16 => Storage::Unsigned(16),
+            Type::FLUXION_UINT32 => Storage::Unsigned(32),
+            Type::FLUXION_OTHER => Storage::Other,
+        }
+    }
+
+    /// Whether every sample is stored in eight bits.
+    pub fn is_eight_bit(&self) -> bool {
+        self.storage.iter().all(|storage| *storage == Storage::Unsigned(8))
     }
 
     /// Samples of all pixels.
@@ -164,8 +214,8 @@ impl<'a> ImageFile<'a> {
 pub fn read(path: &Path, attributes: &[&str]) -> Result<Pixels> {
     let file = ImageFile::open(path)?;
     let attributes = attributes.iter().filter_map(|&name| Some((name.to_owned(), file.attribute(name)?))).collect();
-    let (width, height, eight_bit, channels) = (file.width, file.height, file.eight_bit, file.channels.clone());
-    Ok(Pixels { width, height, channels, data: file.floats()?, eight_bit, attributes })
+    let (width, height, channels, window) = (file.width, file.height, file.channels.clone(), file.window);
+    Ok(Pixels { width, height, channels, data: file.floats()?, window, attributes })
 }
 
 /// A cache of image files that are too large to be held at once.
@@ -245,13 +295,16 @@ pub fn write(path: &Path, pixels: &Pixels, kind: Kind, compression: Option<&str>
     let c_string = |text: &str| CString::new(text).map_err(|_| Error::io(path, "a name holds a NUL byte"));
     let name = path_string(path)?;
     let size = |n: usize| i32::try_from(n).map_err(|_| Error::io(path, "the image is too large for any format"));
+    let DataWindow { origin, full } = pixels.window.unwrap_or(DataWindow { origin: (0, 0), full: (0, 0) });
     let spec = raw::FluxionImageSpec {
         width: size(pixels.width)?,
         height: size(pixels.height)?,
         channels: size(pixels.channels.len())?,
-        x: 0,
-        y: 0,
-        eight_bit: kind == Kind::Uint8,
+        x: size(origin.0)?,
+        y: size(origin.1)?,
+        full_width: size(full.0)?,
+        full_height: size(full.1)?,
+        ..raw::FluxionImageSpec::default()
     };
     let channels = pixels.channels.iter().map(|channel| c_string(channel)).collect::<Result<Vec<_>>>()?;
     let channels: Vec<_> = channels.iter().map(|channel| channel.as_ptr()).collect();
@@ -288,10 +341,12 @@ mod tests {
         let channels = ["R", "G", "B", "depth.Z"].map(String::from).to_vec();
         let data: Vec<f32> = (0..3 * 2 * 4).map(|i| (i as f32).exp() * 1e-3).collect();
         let attributes = vec![("fluxion:seed".to_owned(), "7".to_owned())];
-        let pixels = Pixels { width: 3, height: 2, channels, data, eight_bit: false, attributes };
+        let window = DataWindow { origin: (5, 6), full: (10, 9) };
+        let pixels = Pixels { width: 3, height: 2, channels, data, attributes, window: Some(window) };
         write(file.path(), &pixels, Kind::Float, Some("zips")).unwrap();
         let back = read(file.path(), &["fluxion:seed", "absent"]).unwrap();
         assert_eq!(back.attributes, pixels.attributes);
+        assert_eq!(back.window, Some(window));
         for (index, name) in pixels.channels.iter().enumerate() {
             let at = back.channels.iter().position(|other| other == name).unwrap();
             for pixel in 0..6 {
@@ -305,7 +360,7 @@ mod tests {
         let file = tempfile::Builder::new().suffix(".png").tempfile().unwrap();
         let channels = ["R", "G", "B", "A"].map(String::from).to_vec();
         let data = vec![1.0, 0.4, 0.2, 0.0];
-        let pixels = Pixels { width: 1, height: 1, channels, data, eight_bit: true, attributes: vec![] };
+        let pixels = Pixels { width: 1, height: 1, channels, data, window: None, attributes: vec![] };
         write(file.path(), &pixels, Kind::Uint8, None).unwrap();
         let back = read(file.path(), &[]).unwrap();
         back.data.iter().zip(&pixels.data).for_each(|(a, b)| assert!((a - b).abs() < 1e-3, "{a} {b}"));

@@ -24,7 +24,7 @@ pub fn save(path: &Path, frame: &Frame) -> Result<()> {
         }
     }
     let (width, height, attributes) = (frame.width, frame.height, frame.provenance.attributes());
-    write(path, &Pixels { width, height, channels, data, eight_bit: false, attributes }, Kind::Float, Some("zips"))
+    write(path, &Pixels { width, height, channels, data, window: frame.window, attributes }, Kind::Float, Some("zips"))
 }
 
 /// Reads the layers that a file has. Channels that belong to no layer are ignored.
@@ -42,6 +42,7 @@ pub fn load(path: &Path) -> Result<Frame> {
     if frame.get(Layer::Color).is_none() {
         return Err(Error::io(path, format!("no channels R, G, B among {}", pixels.channels.join(", "))));
     }
+    frame.window = pixels.window;
     frame.provenance = Provenance::from_attributes(&pixels.attributes);
     Ok(frame)
 }

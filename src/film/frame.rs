@@ -8,6 +8,7 @@ use super::layer::Layer;
 use super::{BINS, Cross, EdgeParts, Edges, Provenance, bin_count};
 use crate::error::{Error, Result};
 use crate::image::Image;
+use crate::image::io::DataWindow;
 use crate::math::{Rgb, vec3};
 
 /// Means and variances of a film, as layers. A frame developed in memory and one read from a file are the same.
@@ -22,13 +23,15 @@ pub struct Frame {
     edges: Option<Edges>,
     /// Scene, seed, samples, version and so on.
     pub provenance: Provenance,
+    /// The larger picture that the frame is a part of, if it is.
+    pub window: Option<DataWindow>,
 }
 
 impl Frame {
     /// A frame without layers.
     pub fn new(width: usize, height: usize) -> Self {
         let layers = vec![None; Layer::COUNT];
-        Self { width, height, layers, edges: None, provenance: Provenance::default() }
+        Self { width, height, layers, edges: None, provenance: Provenance::default(), window: None }
     }
 
     /// The same frame with its provenance.

@@ -43,6 +43,10 @@ pub enum Layer {
     Dy,
     /// Variance of [`Layer::Dy`].
     DyVariance,
+    /// Share of the pixel that is covered.
+    Alpha,
+    /// Variance of [`Layer::Alpha`].
+    AlphaVariance,
     /// Sample counts.
     Samples,
     /// Counts of samples with differences, where these are others than [`Layer::Samples`].
@@ -96,10 +100,10 @@ const fn info(
 }
 
 /// Layers that a frame has once, in the order of the enumeration.
-const SINGLE: [(Layer, Info); 21] = {
+const SINGLE: [(Layer, Info); 23] = {
     use self::Layer as L;
     use self::Source::{EdgeMean, EdgeSampleCount, EdgeVariance, Mean, RejectedCount, SampleCount, Variance};
-    use super::statistic::Record::{Color, Direct, Edges, Occlusion, Position, Surface};
+    use super::statistic::Record::{Alpha, Color, Direct, Edges, Occlusion, Position, Surface};
     const RADIANCE: [&str; 3] = ["radiance", ">= 0", "always"];
     const RADIANCE_VARIANCE: [&str; 3] = ["radiance²", ">= 0", "always"];
     const DIFFERENCE: [&str; 3] = ["radiance", "any", "--method l2"];
@@ -236,6 +240,26 @@ const SINGLE: [(Layer, Info); 21] = {
             ),
         ),
         (L::DyVariance, info("dy_variance", RGB, DIFFERENCE_VARIANCE, EdgeVariance(Edges, Y), "variance of dy")),
+        (
+            L::Alpha,
+            info(
+                "",
+                &["A"],
+                ["1", "[0, 1]", "pixel_format"],
+                Mean(Alpha, 0),
+                "share of the samples that met something; colour and `direct` are multiplied by it already",
+            ),
+        ),
+        (
+            L::AlphaVariance,
+            info(
+                "alpha_variance",
+                &["Y"],
+                ["1", ">= 0", "pixel_format"],
+                Variance(Alpha, 0),
+                "variance of the mean of the alpha",
+            ),
+        ),
         (L::Samples, info("samples", &["Y"], COUNT, SampleCount, "samples of the pixel")),
         (
             L::EdgeSamples,

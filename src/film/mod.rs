@@ -121,7 +121,14 @@ mod tests {
         };
         let edges = [Rgb::splat(value); 4];
         let differences = Some(Differences { color: edges, ambient: edges });
-        Sample { color: vec3(value, 2.0, 0.0), direct: Rgb::ONE, features, ambient: Rgb::splat(value), differences }
+        Sample {
+            color: vec3(value, 2.0, 0.0),
+            direct: Rgb::ONE,
+            features,
+            ambient: Rgb::splat(value),
+            alpha: 1.0,
+            differences,
+        }
     }
 
     #[test]

@@ -19,6 +19,9 @@ pub struct Needs {
     pub position: bool,
     /// Bins of the radiance that an ambient light would add, and of its differences.
     pub ambient: bool,
+    /// Share of every pixel that is covered.
+    #[serde(default)]
+    pub alpha: bool,
 }
 
 /// How a film gets the differences between pixels.
@@ -48,8 +51,15 @@ impl EdgeNeed {
 
 impl Needs {
     /// Everything that can be recorded.
-    pub const ALL: Self =
-        Self { features: true, edges: EdgeNeed::Sampled, bins: true, occlusion: true, position: true, ambient: true };
+    pub const ALL: Self = Self {
+        features: true,
+        edges: EdgeNeed::Sampled,
+        bins: true,
+        occlusion: true,
+        position: true,
+        ambient: true,
+        alpha: true,
+    };
 
     /// Colour and sampled edges.
     pub const EDGES: Self = Self {
@@ -59,6 +69,7 @@ impl Needs {
         occlusion: false,
         position: false,
         ambient: false,
+        alpha: false,
     };
 
     /// Bytes per pixel of a film, as long as the camera sees no emitter directly; 24 more where it does.
@@ -82,6 +93,7 @@ impl Needs {
             occlusion: self.occlusion || other.occlusion,
             position: self.position || other.position,
             ambient: self.ambient || other.ambient,
+            alpha: self.alpha || other.alpha,
         }
     }
 }

@@ -48,6 +48,8 @@ pub struct Sample {
     pub features: Features,
     /// Radiance that an unoccluded ambient light of radiance one would add to the colour.
     pub ambient: Rgb,
+    /// 1 if the path has met something that does not just let it through, 0 if not.
+    pub alpha: f32,
     /// Differences to the neighbours; `None` if the path was not shifted, which leaves the edges' counts alone.
     pub differences: Option<Differences>,
 }

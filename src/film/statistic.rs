@@ -19,6 +19,7 @@ pub(super) enum Record {
     EdgeBins,
     AmbientBins,
     AmbientEdgeBins,
+    Alpha,
 }
 
 /// A statistic of every pixel.
@@ -57,7 +58,7 @@ const fn of_edges(statistic: Statistic) -> Statistic {
 }
 
 /// Every statistic, in the order of [`Record`] and of checkpoint files.
-pub(super) const STATISTICS: [Statistic; 10] = [
+pub(super) const STATISTICS: [Statistic; 11] = [
     moments(3, |_| true, |slot, sample| slot.add(sample.color.to_array())),
     Statistic {
         sparse: Some(|sample| sample.direct != Rgb::ZERO),
@@ -79,6 +80,7 @@ pub(super) const STATISTICS: [Statistic; 10] = [
         |needs| needs.ambient && needs.edges.is_sampled(),
         |slot, sample| slot.add_to_bin(sample.ambient_differences()),
     )),
+    moments(1, |needs| needs.alpha, |slot, sample| slot.add([sample.alpha])),
 ];
 
 /// Position of a sample among those of its pixel, as the weights that means are updated with.
@@ -227,6 +229,7 @@ mod tests {
             (Record::EdgeBins, 12),
             (Record::AmbientBins, 3),
             (Record::AmbientEdgeBins, 12),
+            (Record::Alpha, 1),
         ];
         assert_eq!(names.len(), STATISTICS.len());
         for (k, (record, values)) in names.into_iter().enumerate() {

@@ -37,12 +37,12 @@ impl Tile {
     }
 
     /// Fills an empty tile.
-    fn read(&mut self, from: &mut impl Read) -> io::Result<()> {
+    fn read(&mut self, statistics: usize, from: &mut impl Read) -> io::Result<()> {
         let pixels = self.counts.len();
         self.counts = take(from, [pixels; 2])?;
         self.edge_counts = take(from, [self.edge_counts.len(); 2])?;
         self.rejected = take(from, [0, pixels])?;
-        for (statistic, plane) in STATISTICS.iter().zip(&mut self.planes) {
+        for (statistic, plane) in STATISTICS.iter().zip(&mut self.planes).take(statistics) {
             let full = pixels * statistic.stride();
             let allowed = if statistic.sparse.is_some() { [0, full] } else { [plane.len(); 2] };
             *plane = take(from, allowed)?.into_iter().map(f32::from_bits).collect();
@@ -63,9 +63,19 @@ impl Film {
     }
 
     /// Reads a film of the size and with the needs that it was written with.
-    pub fn read((width, height): (usize, usize), needs: Needs, from: &mut impl Read) -> io::Result<Self> {
+    pub fn read(size: (usize, usize), needs: Needs, from: &mut impl Read) -> io::Result<Self> {
+        Self::read_statistics(size, needs, STATISTICS.len(), from)
+    }
+
+    /// The same of a film that was written when there were only so many statistics.
+    pub fn read_statistics(
+        (width, height): (usize, usize),
+        needs: Needs,
+        statistics: usize,
+        from: &mut impl Read,
+    ) -> io::Result<Self> {
         let mut film = Self::new(width, height, needs);
-        film.tiles.iter_mut().try_for_each(|tile| tile.read(from))?;
+        film.tiles.iter_mut().try_for_each(|tile| tile.read(statistics, from))?;
         Ok(film)
     }
 }

@@ -3,16 +3,36 @@
 use std::path::Path;
 
 use super::Image;
+use super::channels::ColorChannels;
 use crate::error::{Error, Result};
 use crate::ffi::oiio;
-pub use crate::ffi::oiio::{CachedTexture, ImageFile, Kind, Pixels, TextureSystem, failed_lookups, read};
+pub use crate::ffi::oiio::{
+    CachedTexture, DataWindow, ImageFile, Kind, Pixels, Storage, TextureSystem, failed_lookups, read,
+};
 use crate::files;
 use crate::math::srgb_encode;
 
 /// Formats that hold linear radiance as floats.
-const LINEAR: &[&str] = &["exr", "hdr"];
+const LINEAR: &[&str] = &["exr", "hdr", "pfm", "tif", "tiff"];
 /// Formats that hold display-encoded eight-bit colour.
 const ENCODED: &[&str] = &["png", "jpg", "jpeg"];
+/// Formats that hold an alpha channel.
+const WITH_ALPHA: &[&str] = &["exr", "tif", "tiff", "png"];
+
+/// Everything that may be written along with an image.
+#[derive(Clone, Debug, Default)]
+pub struct Extras<'a> {
+    /// Share of every pixel that is covered, by which its colour is multiplied already.
+    pub alpha: Option<&'a Image>,
+    /// Named layers of three channels or one, for exr files.
+    pub layers: Vec<(&'a str, &'a Image)>,
+    /// Named strings of the header.
+    pub attributes: Vec<(String, String)>,
+    /// The larger picture that the image is a part of, for exr files.
+    pub window: Option<DataWindow>,
+    /// Exposure of display-encoded formats, in powers of two.
+    pub exposure: f32,
+}
 
 fn extension(path: &Path) -> String {
     path.extension().unwrap_or_default().to_string_lossy().to_lowercase()
@@ -33,58 +53,61 @@ pub fn write(path: &Path, pixels: &Pixels, kind: Kind, compression: Option<&str>
     files::replace(path, |part| oiio::write(part, pixels, kind, compression))
 }
 
-/// Writes a linear RGB image: as it is to exr and hdr; clamped and sRGB-encoded to png and jpg. An exr file gets
-/// the named `layers`, too, of three channels or one.
-pub fn write_color(
-    path: &Path,
-    image: &Image,
-    layers: &[(&str, &Image)],
-    attributes: &[(String, String)],
-) -> Result<()> {
+/// Writes a linear RGB image: as it is to exr, hdr, pfm and tiff; exposed, clamped and sRGB-encoded to png and jpg, whose
+/// colours are those without their alpha. What a format cannot hold is left out.
+pub fn write_color(path: &Path, image: &Image, extras: &Extras) -> Result<()> {
     check_writable(path)?;
-    let encoded = ENCODED.contains(&extension(path).as_str());
-    let encode = |&value: &f32| srgb_encode(value.clamp(0.0, 1.0));
-    let exr = extension(path) == "exr";
-    let layers = if exr { layers } else { &[] };
+    let extension = extension(path);
+    let (encoded, exr) = (ENCODED.contains(&extension.as_str()), extension == "exr");
+    let alpha = extras.alpha.filter(|_| WITH_ALPHA.contains(&extension.as_str()));
+    let layers = if exr { extras.layers.as_slice() } else { &[] };
     let mut channels = ["R", "G", "B"].map(String::from).to_vec();
+    channels.extend(alpha.map(|_| "A".to_owned()));
     for (name, layer) in layers {
         let components = if layer.channels == 1 { &["Y"][..] } else { &["R", "G", "B"] };
         channels.extend(components.iter().map(|component| format!("{name}.{component}")));
     }
-    let data = if encoded {
-        image.data.iter().map(encode).collect()
-    } else {
-        let all = || std::iter::once(image).chain(layers.iter().map(|(_, layer)| *layer));
-        let pixels = 0..image.width * image.height;
-        pixels
-            .flat_map(|i| all().flat_map(move |image| &image.data[i * image.channels..][..image.channels]))
-            .copied()
-            .collect()
-    };
-    let (width, height, attributes) = (image.width, image.height, attributes.to_vec());
-    let pixels = Pixels { width, height, channels, data, eight_bit: encoded, attributes };
+    let mut data = Vec::with_capacity(image.width * image.height * channels.len());
+    for i in 0..image.width * image.height {
+        let covered = alpha.map(|alpha| alpha.data[i]);
+        if encoded {
+            let share = covered.filter(|&share| share > 0.0).unwrap_or(1.0);
+            let scale = extras.exposure.exp2() / share;
+            data.extend(samples(image, i).iter().map(|value| srgb_encode((value * scale).clamp(0.0, 1.0))));
+        } else {
+            data.extend(samples(image, i));
+        }
+        data.extend(covered.map(|share| share.clamp(0.0, 1.0)));
+        layers.iter().for_each(|(_, layer)| data.extend(samples(layer, i)));
+    }
+    let (width, height, attributes) = (image.width, image.height, extras.attributes.clone());
+    if extension == "pfm" {
+        return files::write(path, pfm(width, &data));
+    }
+    let pixels = Pixels { width, height, channels, data, window: extras.window.filter(|_| exr), attributes };
     write(path, &pixels, if encoded { Kind::Uint8 } else { Kind::Float }, exr.then_some("zips"))
 }
 
-/// Positions of the R, G and B channels. Without them, a file of up to `grey` channels has its first one thrice.
-pub fn rgb_channels(path: &Path, channels: &[String], grey: usize) -> Result<[usize; 3]> {
-    let find = |name: &str| channels.iter().position(|other| other.eq_ignore_ascii_case(name));
-    match (find("R"), find("G"), find("B")) {
-        (Some(r), Some(g), Some(b)) => Ok([r, g, b]),
-        _ if channels.len() <= grey => Ok([0; 3]),
-        _ => Err(Error::io(path, format!("no channels R, G, B among {}", channels.join(", ")))),
-    }
+/// A portable float map: little-endian, rows from the bottom.
+fn pfm(width: usize, rgb: &[f32]) -> Vec<u8> {
+    let rows = rgb.chunks_exact(3 * width);
+    let mut bytes = format!("PF\n{width} {}\n-1.0\n", rows.len()).into_bytes();
+    rows.rev().flatten().for_each(|value| bytes.extend(value.to_le_bytes()));
+    bytes
 }
 
-/// Reads the R, G and B channels of a linear image (or its single channel, as grey). Eight-bit files are
-/// decoded from sRGB.
+/// The samples of pixel number `i`.
+fn samples(image: &Image, i: usize) -> &[f32] {
+    &image.data[i * image.channels..][..image.channels]
+}
+
+/// Reads the colours of an image file as linear RGB.
 pub fn read_color(path: &Path) -> Result<Image> {
-    let pixels = read(path, &[])?;
-    let wanted = rgb_channels(path, &pixels.channels, 1)?;
-    let decode = |value: f32| if pixels.eight_bit { crate::math::srgb_decode(value) } else { value };
-    let count = pixels.channels.len();
-    let data = pixels.data.chunks_exact(count).flat_map(|pixel| wanted.map(|c| decode(pixel[c]))).collect();
-    Ok(Image { width: pixels.width, height: pixels.height, channels: 3, data })
+    let file = ImageFile::open(path)?;
+    let colors = ColorChannels::of(&file, path, false)?;
+    let pixels = file.floats()?;
+    let data = pixels.chunks_exact(file.channels.len()).flat_map(|pixel| colors.color(pixel).to_array()).collect();
+    Ok(Image { width: file.width, height: file.height, channels: 3, data })
 }
 
 #[cfg(test)]
@@ -96,15 +119,17 @@ mod tests {
     fn every_format_gives_back_what_it_can_hold() {
         let image = Image::from_rgb(40, 24, |x, y| vec3(x as f32 / 40.0, y as f32 / 24.0, 0.5));
         let folder = tempfile::tempdir().unwrap();
-        for (name, tolerance) in [("a.exr", 0.0), ("a.hdr", 0.01), ("a.png", 0.01), ("a.jpg", 0.2)] {
+        for (name, tolerance) in
+            [("a.exr", 0.0), ("a.pfm", 0.0), ("a.tiff", 0.0), ("a.hdr", 0.01), ("a.png", 0.01), ("a.jpg", 0.2)]
+        {
             let path = folder.path().join(name);
-            write_color(&path, &image, &[], &[]).unwrap();
+            write_color(&path, &image, &Extras::default()).unwrap();
             let back = read_color(&path).unwrap();
             assert_eq!(back.shape(), image.shape());
             let worst = back.data.iter().zip(&image.data).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
             assert!(worst <= tolerance, "{name}: {worst}");
         }
-        let error = write_color(&folder.path().join("a.xyz"), &image, &[], &[]).unwrap_err();
+        let error = write_color(&folder.path().join("a.xyz"), &image, &Extras::default()).unwrap_err();
         assert!(error.to_string().contains("not one of exr"), "{error}");
     }
 }

@@ -1,5 +1,6 @@
 //! Images of floats: rows from the top, channels interleaved.
 
+pub mod channels;
 pub mod io;
 pub mod nl_means;
 #[cfg(feature = "oidn")]

@@ -103,7 +103,7 @@ impl Reconstruction for ControlVariate {
                 a.iter().zip(&b).map(|(a, b)| std::array::from_fn(|c| 0.5 * (a[c] + b[c]))).collect()
             }
         };
-        Ok(Solution { image: inputs.image(&solution), error: None, notes: Vec::new() })
+        Ok(Solution { image: inputs.image(&solution), alpha: None, error: None, notes: Vec::new() })
     }
 }
 

@@ -46,6 +46,7 @@ impl Reconstruction for Feature {
         let error = generated::error(&variance, &Planes::new(width, height, 1));
         Ok(Solution {
             image: feature.to_image(width, height, 1.0 / inputs.scale),
+            alpha: None,
             error: Some(inputs.error(&error.map(|error| error / 3.0))),
             notes: Vec::new(),
         })

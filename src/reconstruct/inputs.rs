@@ -52,6 +52,11 @@ impl<'a> Inputs<'a> {
         }))
     }
 
+    /// Share of every pixel that is covered, if the frame has it.
+    pub fn alpha(&self) -> Result<Option<Planes>> {
+        self.frame.get(Layer::Alpha).map(|_| self.planes(Layer::Alpha, 1.0)).transpose()
+    }
+
     /// Radiance and its variance.
     pub fn color(&self) -> Result<[Planes; 2]> {
         Ok([self.planes(Layer::Color, self.scale)?, self.planes(Layer::ColorVariance, self.scale * self.scale)?])

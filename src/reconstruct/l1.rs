@@ -63,6 +63,6 @@ impl Reconstruction for L1 {
         let differences = inputs.differences(&edges);
         let targets = Targets { edges: &edges, data: &data, differences: &differences };
         let solution = irls::solve(targets, &vec![1.0; edges.len()], self.alpha, self.options);
-        Ok(Solution { image: inputs.image(&solution), error: None, notes: Vec::new() })
+        Ok(Solution { image: inputs.image(&solution), alpha: None, error: None, notes: Vec::new() })
     }
 }

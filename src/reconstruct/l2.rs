@@ -52,7 +52,7 @@ impl Reconstruction for L2 {
             Err(_) if frame.has_own_edges() => self.by_multigrid(frame)?,
             cross => self.by_cosines(frame.require(Layer::Color)?, &cross?),
         };
-        Ok(Solution { image, error: None, notes: Vec::new() })
+        Ok(Solution { image, alpha: None, error: None, notes: Vec::new() })
     }
 }
 

@@ -94,7 +94,7 @@ impl Reconstruction for LeastTrimmed {
         } else {
             self.least_squares(targets, &kept, solution, FINAL)
         };
-        Ok(Solution { image: inputs.image(&solution), error: None, notes: Vec::new() })
+        Ok(Solution { image: inputs.image(&solution), alpha: None, error: None, notes: Vec::new() })
     }
 }
 

@@ -29,6 +29,9 @@ use crate::image::Image;
 pub struct Solution {
     /// The image in radiance, directly seen emitters included.
     pub image: Image,
+    /// Share of every pixel that is covered, if the frame has it: filtered as the colours are where the method has weights
+    /// for them, otherwise as sampled.
+    pub alpha: Option<Image>,
     /// Expected squared error of each value, if the method estimates it.
     pub error: Option<Image>,
     /// Intermediate images, if the context asks for them.
@@ -187,6 +190,7 @@ pub fn solve(method: &dyn Reconstruction, frame: &Frame, context: &Context) -> R
     if let Some(direct) = frame.get(Layer::Direct) {
         solution.image.add(direct);
     }
+    solution.alpha = solution.alpha.or_else(|| frame.get(Layer::Alpha).cloned());
     if let (Some(error), Some(variance)) = (&mut solution.error, frame.get(Layer::DirectVariance)) {
         error.add(variance);
     }

@@ -65,8 +65,11 @@ impl Reconstruction for Nlm {
         }
         let settings = NlmSettings { feature: self.features.then_some(FEATURE), ..self.settings };
         let guides = Guides { color: inputs.guide()?, features };
-        let filtered = nl_means::filter(&guides.color.mean, &guides, settings);
-        let image = filtered.to_image(frame.width, frame.height, 1.0 / inputs.scale);
-        Ok(Solution { image, error: None, notes: Vec::new() })
+        let alpha = inputs.alpha()?;
+        let values = alpha.as_ref().map(|alpha| guides.color.mean.clone().and(alpha));
+        let filtered = nl_means::filter(values.as_ref().unwrap_or(&guides.color.mean), &guides, settings);
+        let image = filtered.part(0, 3).to_image(frame.width, frame.height, 1.0 / inputs.scale);
+        let alpha = alpha.map(|_| filtered.part(3, 1).to_image(frame.width, frame.height, 1.0));
+        Ok(Solution { image, alpha, error: None, notes: Vec::new() })
     }
 }

@@ -50,6 +50,6 @@ impl Reconstruction for Oidn {
         direct.iter().for_each(|direct| {
             image.data.iter_mut().zip(&direct.data).for_each(|(value, direct)| *value -= direct);
         });
-        Ok(Solution { image, error: None, notes: Vec::new() })
+        Ok(Solution { image, alpha: None, error: None, notes: Vec::new() })
     }
 }

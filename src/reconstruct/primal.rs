@@ -26,6 +26,6 @@ impl Reconstruction for Primal {
 
     fn reconstruct(&self, frame: &Frame, _context: &Context) -> Result<Solution> {
         let image = frame.require(Layer::Color)?.clone();
-        Ok(Solution { image, error: frame.get(Layer::ColorVariance).cloned(), notes: Vec::new() })
+        Ok(Solution { image, alpha: None, error: frame.get(Layer::ColorVariance).cloned(), notes: Vec::new() })
     }
 }

@@ -52,6 +52,7 @@ impl Reconstruction for Rdfc {
         let Denoised { image, error } = rdfc::denoise(&Guides { color, features: features.into() }, options, &report);
         Ok(Solution {
             image: image.to_image(frame.width, frame.height, 1.0 / inputs.scale),
+            alpha: None,
             error: Some(inputs.error(&error)),
             notes: Vec::new(),
         })

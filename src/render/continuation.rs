@@ -39,6 +39,7 @@ pub fn shade(
     let numbers = sampler.scatter(packet.hash, depth);
     let choices = (numbers.lobe, numbers.direction);
     let found = materials.sample(scene, surfaces, choices, vertices.hit, scatters);
+    vertices.passed = found & scatters.pass();
     let throughput = packet.throughput.scale(scatters.weight);
     let sum = throughput.x + throughput.y + throughput.z;
     let non_finite = found & !sum.abs().less(Lanes::splat(f32::INFINITY));

@@ -67,6 +67,11 @@ impl PathRecord {
         }
     }
 
+    /// Marks the samples of paths that have met something, be it the environment.
+    pub fn cover(&mut self, packet: &Packet, lanes: Mask) {
+        lanes.lanes().for_each(|lane| self.samples[packet.id.0[lane] as usize].alpha = 1.0);
+    }
+
     /// Updates the features by the surfaces that active paths have come to.
     pub fn describe(
         &mut self,

@@ -76,6 +76,9 @@ impl<'a> PathTracer<'a> {
             }
             let shaded = shade((scene, &sampler), depth, packet, vertices, (k * LANES) as u32, next);
             record.add_direct(depth, vertices, &shaded);
+            if needs.alpha {
+                record.cover(packet, vertices.hit & !vertices.passed);
+            }
             if describes(*needs) || needs.ambient {
                 record.update_after_scatter(vertices, needs.ambient);
             }
@@ -110,9 +113,15 @@ fn arrive(
     if describes(needs) {
         record.describe(scene, depth, packet, (vertices, active, hit));
     }
+    if needs.alpha && depth == 0 && scene.has_environment() && !hide_emitters {
+        record.cover(packet, active);
+    }
     vertices.hits_emitter = Mask::NONE;
     if depth + 1 >= max_depth {
         vertices.hit = Mask::NONE;
+        if needs.alpha {
+            record.cover(packet, hit);
+        }
         return;
     }
     (vertices.hit, vertices.id, vertices.throughput) = (hit, packet.id, packet.throughput);

@@ -22,6 +22,8 @@ pub struct Vertices {
     pub light: Light,
     /// Lanes whose path continues.
     pub scattered: Mask,
+    /// Lanes that the surface lets pass straight through.
+    pub passed: Mask,
     /// Sampled directions.
     pub scatters: Scatters,
     /// Survival probabilities of Russian roulette after the vertices.
@@ -73,6 +75,7 @@ impl Default for Vertices {
             lit: Mask::NONE,
             light: Light { points: points.clone(), radiance: zero3, wo: zero3, evals: Evals::default(), pdf: zero },
             scattered: Mask::NONE,
+            passed: Mask::NONE,
             scatters: Scatters::default(),
             survival: zero,
             next: Bits::ZERO,

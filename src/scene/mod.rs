@@ -19,7 +19,7 @@ use self::accel::Accel;
 use self::bsdf::Bsdf;
 use self::emitter::{Choice, Emitter, LightPoint};
 use self::packet::{EmitterInfo, ShapeInfo};
-use self::sensor::Sensor;
+use self::sensor::{Sensor, SensorInfo};
 pub use self::shape::Bounds;
 use self::shape::Geometry;
 pub use self::stats::SceneStats;
@@ -97,6 +97,10 @@ pub struct SceneDescription {
     pub fingerprint: u64,
     /// Mesh and image files that it was read from.
     pub files: Vec<PathBuf>,
+    /// Every sensor of the file.
+    pub sensors: Vec<SensorInfo>,
+    /// The loader's warnings.
+    pub warnings: Vec<String>,
 }
 
 /// Geometry, materials, emitters and sensor.
@@ -117,12 +121,14 @@ pub struct Scene {
     integrator: Integrator,
     fingerprint: u64,
     files: Vec<PathBuf>,
+    sensors: Vec<SensorInfo>,
+    warnings: Vec<String>,
 }
 
 impl Scene {
     /// Builds the acceleration structure and the emitter choice.
     pub fn build(parts: SceneDescription, threads: usize) -> Result<Self> {
-        let SceneDescription { mut shapes, groups, mut emitters, sensor, integrator, fingerprint, files } = parts;
+        let SceneDescription { mut shapes, groups, mut emitters, sensor, integrator, fingerprint, files, .. } = parts;
         let accel = Accel::build(&shapes, &groups, threads)?;
         shapes.extend(groups.into_iter().flat_map(|group| group.shapes));
         let numbered = (0u32..).zip(&emitters);
@@ -152,6 +158,8 @@ impl Scene {
             integrator,
             fingerprint,
             files,
+            sensors: parts.sensors,
+            warnings: parts.warnings,
         })
     }
 
@@ -217,6 +225,16 @@ impl Scene {
     /// The camera.
     pub fn sensor(&self) -> &Sensor {
         &self.sensor
+    }
+
+    /// Every sensor of the file, in order.
+    pub fn sensors(&self) -> &[SensorInfo] {
+        &self.sensors
+    }
+
+    /// Everything that the loader found to mean something else than it says.
+    pub fn warnings(&self) -> &[String] {
+        &self.warnings
     }
 
     /// Path depths.

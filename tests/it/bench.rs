@@ -112,7 +112,9 @@ fn definitions_make_another_scene() {
         fluxion(folder.path(), &[&["reference", "s.xml", "-o", "r.exr", "-q", "--size", "8x8"], more].concat())
     };
     assert_eq!(go(&["--spp", "8", "-D", "depth=2"]).0, 0);
-    assert_eq!(go(&["--spp", "16", "-D", "depth=2", "-D", "nosuch=1"]).0, 0);
+    let (code, _, errors) = go(&["--spp", "16", "-D", "depht=2"]);
+    assert!(code == 2 && errors.contains("no parameter `depht`; it has `depth`"), "{errors}");
+    assert_eq!(go(&["--spp", "16", "-D", "depth=2"]).0, 0);
     let (code, _, errors) = go(&["--spp", "32", "-D", "depth=4"]);
     assert!(code == 1 && errors.contains("reference of another scene"), "{errors}");
 }

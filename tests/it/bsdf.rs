@@ -56,6 +56,51 @@ const CASES: &[(&str, &str)] = &[
         r#"<bsdf type="normalmap"><texture type="rawconstant" name="normalmap"><vector name="value" value="0.6,0.55,0.95"/></texture><bsdf type="roughplastic"><float name="alpha" value="0.3"/></bsdf></bsdf>"#,
     ),
     ("thindielectric", r#"<bsdf type="thindielectric"/>"#),
+    (
+        "roughdiffuse",
+        r#"<bsdf type="roughdiffuse"><float name="alpha" value="0.5"/><float name="reflectance" value="1"/></bsdf>"#,
+    ),
+    (
+        "roughdiffuse",
+        r#"<bsdf type="roughdiffuse"><rgb name="reflectance" value="0.9,0.5,0.1"/><boolean name="use_fast_approx" value="true"/></bsdf>"#,
+    ),
+    ("phong", r#"<bsdf type="phong"><float name="exponent" value="12"/></bsdf>"#),
+    (
+        "phong",
+        r#"<bsdf type="phong"><float name="exponent" value="60"/><rgb name="specular_reflectance" value="0.9,0.5,0.2"/><rgb name="diffuse_reflectance" value="0.3,0.5,0.6"/></bsdf>"#,
+    ),
+    ("ward", r#"<bsdf type="ward"><float name="alpha" value="0.3"/></bsdf>"#),
+    (
+        "ward",
+        r#"<bsdf type="ward"><string name="variant" value="ward"/><float name="alpha_u" value="0.4"/><float name="alpha_v" value="0.2"/><rgb name="specular_reflectance" value="0.8"/><rgb name="diffuse_reflectance" value="0.1"/></bsdf>"#,
+    ),
+    ("ward", r#"<bsdf type="ward"><string name="variant" value="ward-duer"/><float name="alpha" value="0.4"/></bsdf>"#),
+    ("pplastic", r#"<bsdf type="pplastic"><float name="alpha" value="0.25"/></bsdf>"#),
+    (
+        "mixturebsdf",
+        r#"<bsdf type="mixturebsdf"><string name="weights" value="0.2, 0.5, 0.1"/><bsdf type="diffuse"/><bsdf type="plastic"/><bsdf type="roughconductor"><float name="alpha" value="0.3"/></bsdf></bsdf>"#,
+    ),
+    (
+        "coating",
+        r#"<bsdf type="coating"><rgb name="sigma_a" value="0.1,0.3,0.9"/><float name="thickness" value="0.5"/><bsdf type="diffuse"/></bsdf>"#,
+    ),
+    ("coating", r#"<bsdf type="coating"><bsdf type="roughconductor"><float name="alpha" value="0.3"/></bsdf></bsdf>"#),
+    ("coating", r#"<bsdf type="coating"><bsdf type="conductor"><string name="material" value="Au"/></bsdf></bsdf>"#),
+    (
+        "twosided",
+        r#"<bsdf type="twosided"><bsdf type="coating"><float name="int_ior" value="1.7"/><bsdf type="plastic"/></bsdf></bsdf>"#,
+    ),
+    (
+        "roughcoating",
+        r#"<bsdf type="roughcoating"><float name="alpha" value="0.25"/><rgb name="sigma_a" value="0.1,0.3,0.9"/><bsdf type="diffuse"/></bsdf>"#,
+    ),
+    (
+        "roughcoating",
+        r#"<bsdf type="roughcoating"><float name="alpha" value="0.3"/><string name="distribution" value="ggx"/><bsdf type="mask"><float name="opacity" value="0.6"/><bsdf type="roughplastic"><float name="alpha" value="0.3"/></bsdf></bsdf></bsdf>"#,
+    ),
+    ("polarizer", r#"<bsdf type="polarizer"><rgb name="transmittance" value="0.9,0.5,0.1"/></bsdf>"#),
+    ("circular", r#"<bsdf type="circular"/>"#),
+    ("retarder", r#"<bsdf type="retarder"><float name="transmittance" value="0.7"/></bsdf>"#),
     ("plastic", r#"<bsdf type="plastic"><boolean name="nonlinear" value="true"/></bsdf>"#),
     ("roughplastic", r#"<bsdf type="roughplastic"><float name="alpha" value="0.2"/></bsdf>"#),
     (

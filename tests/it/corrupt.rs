@@ -135,7 +135,7 @@ fn layers_and_images() {
     let image = fluxion::image::Image::from_rgb(40, 30, |x, y| fluxion::math::vec3(x as f32, y as f32, 9.0) / 40.0);
     for name in ["a.exr", "a.hdr", "a.png", "a.jpg"] {
         let path = folder.path().join(name);
-        io::write_color(&path, &image, &[], &[]).unwrap();
+        io::write_color(&path, &image, &io::Extras::default()).unwrap();
         check(name, &fs::read(&path).unwrap(), |bytes| {
             fs::write(&path, bytes).unwrap();
             // Pixels of formats without checksums may be damaged and nobody can know.

@@ -5,7 +5,7 @@ use std::time::Instant;
 use anyhow::Result;
 use fluxion::adaptive::{self, AdaptiveOutcome, AdaptiveSettings, Limits, Start};
 use fluxion::film::{Frame, Needs, Provenance, exr};
-use fluxion::image::io::failed_lookups;
+use fluxion::image::io::{DataWindow, failed_lookups};
 use fluxion::reconstruct::{Reconstruction, Solution};
 use fluxion::reference::fingerprint;
 use fluxion::render::{self, Budget, Control, RenderOutcome, RenderSettings, SampleId};
@@ -13,8 +13,10 @@ use fluxion::scene::Scene;
 
 use super::{Args, shift};
 use crate::cli::checkpoint::CheckpointWriter;
+use crate::cli::interrupt::stop_on_signal;
 use crate::cli::stats::Stats;
-use crate::cli::{method, progress, stop_on_interrupt};
+use crate::cli::terminal::note;
+use crate::cli::{method, progress};
 
 /// A render with its options.
 pub struct Job<'a> {
@@ -41,7 +43,7 @@ impl Job<'_> {
         } else {
             self.straight(start, stats)?
         };
-        method::write(&args.output, &solution, &frame, stats)?;
+        method::write(&args.method, &args.output, &solution, &frame, stats)?;
         layers?;
         if let Some(path) = &args.json {
             stats.save(path)?;
@@ -55,7 +57,7 @@ impl Job<'_> {
 
     /// Runs something long under a progress bar; an interrupt stops it.
     fn controlled<T>(&self, work: impl FnOnce(&Control) -> Result<T>) -> Result<T> {
-        let stop = stop_on_interrupt()?;
+        let stop = stop_on_signal()?;
         let bar = progress::bar(self.args.quiet);
         bar.set_message("rendering");
         let report = |share| progress::set(&bar, share);
@@ -77,7 +79,7 @@ impl Job<'_> {
         self.warn(&outcome);
         stats.rendered(&outcome);
         let developing = Instant::now();
-        let frame = outcome.film.develop().with_provenance(self.provenance(stats));
+        let frame = self.complete(outcome.film.develop(), stats);
         stats.seconds.develop = developing.elapsed().as_secs_f64();
         let layers = self.save_layers(&frame, stats);
         let solution = args.method.solve(self.method, &frame, args.quiet, stats)?;
@@ -107,11 +109,11 @@ impl Job<'_> {
         self.warn(&render);
         stats.rendered(&render);
         (stats.seconds.develop, stats.seconds.reconstruct, stats.passes) = (develop, reconstruct, passes);
-        let frame = frame.with_provenance(self.provenance(stats));
+        let frame = self.complete(frame, stats);
         let layers = self.save_layers(&frame, stats);
         args.method.write_notes(&solution, &frame)?;
         if let (false, Some(error)) = (args.quiet, stats.passes.last().and_then(|pass| pass.error)) {
-            eprintln!("estimated relMSE {error:.2e} after {} passes", stats.passes.len());
+            note!("estimated relMSE {error:.2e} after {} passes", stats.passes.len());
         }
         Ok(Rendered { frame, solution, layers })
     }
@@ -130,30 +132,32 @@ impl Job<'_> {
         let args = self.args;
         if let Some((path, count)) = failed_lookups() {
             let path = path.display();
-            eprintln!(
-                "warning: {count} lookups in textures that can no longer be read were black, the first in {path}"
-            );
+            note!("warning: {count} lookups in textures that can no longer be read were black, the first in {path}");
         }
         if outcome.stopped {
             let spp = outcome.film.most_samples();
-            eprintln!("warning: stopped early; the image has up to {spp} samples per pixel");
+            note!("warning: stopped early; the image has up to {spp} samples per pixel");
         }
         if let Some((id, reason)) = outcome.first_rejected {
             let (count, SampleId { x, y, index, seed }) = (outcome.film.rejected(), id);
-            eprintln!(
-                "warning: {count} samples were not finite ({}) and count as zero; the first one again:",
-                reason.0
-            );
-            let (width, height) = (outcome.film.width, outcome.film.height);
+            note!("warning: {count} samples were not finite ({}) and count as zero; the first one again:", reason.0);
+            let options = args.options.as_text();
             let threshold = args.shift_threshold.map_or(String::new(), |alpha| format!(" --shift-threshold {alpha}"));
-            let definitions: String = args.define.iter().map(|(name, value)| format!(" -D '{name}={value}'")).collect();
-            eprintln!(
-                "  fluxion render {} --size {width}x{height} --seed {seed} --shift {}{threshold}{definitions} \
+            note!(
+                "  fluxion render {} --seed {seed} --shift {}{threshold}{options} \
                  --replay {x},{y},{index}",
                 args.scene.display(),
                 args.shift
             );
         }
+    }
+
+    /// A frame with everything that files say of it.
+    fn complete(&self, frame: Frame, stats: &Stats) -> Frame {
+        let window = self.scene.sensor().part().map(|(crop, full)| DataWindow { origin: (crop.x, crop.y), full });
+        let mut frame = frame.with_provenance(self.provenance(stats));
+        frame.window = window;
+        frame
     }
 
     /// Provenance of everything that is written.

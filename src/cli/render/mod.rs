@@ -22,13 +22,14 @@ use self::job::Job;
 use super::outputs::Claims;
 use super::stats::Stats;
 use super::{checkpoint, method, progress, stats};
+use crate::cli::terminal::{note, out};
 
 /// Options of `render`.
 #[derive(clap::Args)]
 pub struct Args {
     /// Scene file, Mitsuba 3 XML
     scene: PathBuf,
-    /// Image to write, by its extension: exr, hdr, png or jpg; may be given several times
+    /// Image to write, by its extension: exr, hdr, pfm, tiff, png or jpg; may be given several times
     #[arg(short, long, required_unless_present = "replay", value_name = "FILE")]
     output: Vec<PathBuf>,
     /// Samples per pixel [default: the scene's own]
@@ -55,9 +56,8 @@ pub struct Args {
     /// Threads to work with (0: one per core)
     #[arg(long, default_value_t = 0)]
     threads: usize,
-    /// Film size in place of the scene's, as in 640x360
-    #[arg(long, value_parser = super::parse_size, value_name = "WxH")]
-    size: Option<(usize, usize)>,
+    #[command(flatten)]
+    options: super::scene::Args,
     #[command(flatten)]
     method: method::Args,
     /// EXR file of all recorded layers, for `fluxion reconstruct`
@@ -78,15 +78,12 @@ pub struct Args {
     /// Compute what scene, method and layers need, or everything, to see the savings
     #[arg(long, default_value = "needed", value_enum, value_name = "WHAT")]
     plan: Planned,
-    /// JSON file for times, samples, memory and the plan
+    /// JSON file for times, samples, memory and the plan; - is standard output
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
     /// Trace one sample again and print it: column, row and number of the sample
     #[arg(long, value_parser = parse_sample, value_name = "X,Y,S")]
     replay: Option<(usize, usize, u32)>,
-    /// Value of a scene parameter, over its <default>
-    #[arg(short = 'D', value_parser = super::parse_definition, value_name = "NAME=VALUE")]
-    define: Vec<(String, String)>,
     /// How paths are shifted to neighbouring pixels
     #[arg(long, default_value = SHIFTS[0].id, value_parser = shift_names(), hide_short_help = true)]
     shift: String,
@@ -130,12 +127,11 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let mut stats = Stats { method: args.method.method.clone(), ..Stats::default() };
     let start = Instant::now();
     let texture_memory = args.texture_memory << 20;
-    let options =
-        load::Options { parameters: args.define.clone(), size: args.size, threads: args.threads, texture_memory };
-    let mut scene = load::load(&args.scene, &options)?;
+    let options = load::Options { threads: args.threads, texture_memory, ..args.options.options() };
+    let mut scene = super::scene::load(&args.scene, &options)?;
     stats.seconds.load = start.elapsed().as_secs_f64();
     if scene.emitters().is_empty() {
-        eprintln!("warning: nothing in {} emits light: the image is black", args.scene.display());
+        note!("warning: nothing in {} emits light: the image is black", args.scene.display());
     }
     let saved = match &args.layers {
         Some(_) => Needs {
@@ -145,6 +141,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             occlusion: args.occlusion,
             position: args.position,
             ambient: args.ambient,
+            alpha: false,
         },
         None => Needs::default(),
     };
@@ -211,7 +208,7 @@ fn report(args: &Args, stats: &stats::Stats) {
     }
     let rate = stats.samples as f64 / stats.seconds.render.max(1e-9) / 1e6;
     let time = |seconds| progress::seconds(Duration::from_secs_f64(seconds));
-    eprintln!(
+    note!(
         "load {}, render {} ({} spp, {rate:.2} million samples a second), reconstruct {}, write {}",
         time(stats.seconds.load),
         time(stats.seconds.render),
@@ -228,6 +225,6 @@ fn replay(args: &Args, scene: &Scene, (x, y, index): (usize, usize, u32)) -> Res
     }
     let id = SampleId { seed: args.seed, x, y, index };
     let sample = render::sample(scene, id, shift(args));
-    println!("{sample:#?}");
+    out!("{sample:#?}")?;
     Ok(ExitCode::SUCCESS)
 }

@@ -235,6 +235,7 @@ impl Blend {
         let image = Planes::from_fn(width, height, 3, |c, x, y| value(c, x as isize, y as isize));
         Solution {
             image: image.to_image(width, height, 1.0 / inputs.scale),
+            alpha: None,
             error: Some(inputs.error(&shares.part(1, 1).map(|error| error / 3.0))),
             notes: Vec::new(),
         }

@@ -93,7 +93,12 @@ impl Reconstruction for Nfor {
         let guide = Guide { mean: mean.clone(), variance: left, tolerance: None };
         let image =
             regress(&mean, &features, &guide, tolerances[1]).to_image(frame.width, frame.height, 1.0 / inputs.scale);
-        Ok(Solution { image, error: Some(inputs.error(&error.map(|error| error / 3.0))), notes: Vec::new() })
+        Ok(Solution {
+            image,
+            alpha: None,
+            error: Some(inputs.error(&error.map(|error| error / 3.0))),
+            notes: Vec::new(),
+        })
     }
 }
 

@@ -8,10 +8,51 @@ use crate::math::{Rgb, Vec2, Vec3};
 use crate::scene::Surface;
 use crate::scene::load::props::Object;
 use crate::scene::load::{Loader, Plugin};
-use crate::scene::texture::Texture;
+use crate::scene::texture::{Constant, Texture};
 
 /// `blendbsdf`: `weight` is the share of the second material.
 pub const PLUGIN: Plugin<Arc<dyn Bsdf>> = Plugin { name: "blendbsdf", parameters: "weight, two nested bsdfs", make };
+
+/// `mixturebsdf`: weights of any number of materials. What is missing to a sum of one is absorbed.
+pub const MIXTURE: Plugin<Arc<dyn Bsdf>> =
+    Plugin { name: "mixturebsdf", parameters: "weights, as many nested bsdfs", make: make_mixture };
+
+/// Blends of blends: the first material with the rest, the second with the rest of that, and so on.
+fn make_mixture(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Bsdf>> {
+    let loc = object.loc_of("weights");
+    let text = object.string("weights", "")?;
+    let words = text.split([',', ';', ' ']).filter(|word| !word.is_empty());
+    let weights = words.map(|word| word.parse().ok().filter(|&weight: &f32| weight >= 0.0 && weight.is_finite()));
+    let weights = weights.collect::<Option<Vec<f32>>>();
+    let weights = weights.ok_or_else(|| loc.invalid(format!("`weights` is `{text}`; it is a list as in 0.7, 0.3")))?;
+    let nested = loader.nested_bsdfs(object)?;
+    let sum: f32 = weights.iter().sum();
+    if weights.len() != nested.len() || sum <= 0.0 {
+        let what = format!(
+            "{} weights of {} nested bsdfs: each needs one, and one a positive one",
+            weights.len(),
+            nested.len()
+        );
+        return Err(loc.invalid(what));
+    }
+    if sum > 1.0 + 1e-4 {
+        loader.warn(&loc, format!("`weights` add up to {sum}: they are divided by that"))?;
+    }
+    let (mut rest, mut rest_weight) = (super::diffuse::uniform(0.0), (1.0 - sum).max(0.0));
+    for (bsdf, weight) in nested.into_iter().zip(weights).rev() {
+        let total = rest_weight + weight;
+        rest = match (rest_weight > 0.0, weight > 0.0) {
+            (true, true) => {
+                let weight = Arc::new(Constant(Rgb::splat(rest_weight / total)));
+                Arc::new(Blend { weight, nested: [bsdf, rest] })
+            }
+            (false, _) => bsdf,
+            (true, false) => rest,
+        };
+        rest_weight = total;
+    }
+    Ok(rest)
+}
 
 fn make(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Bsdf>> {
     if object.get("weight").is_none() {

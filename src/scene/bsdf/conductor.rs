@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Bsdf, BsdfSample, Delta, Eval, Lobe, metals};
+use super::{Bsdf, BsdfSample, Delta, Eval, Lobe, ior, metals};
 use crate::error::Result;
 use crate::math::{Rgb, Vec2, Vec3, fresnel, vec3};
 use crate::scene::Surface;
@@ -12,7 +12,7 @@ use crate::scene::texture::Texture;
 
 /// `conductor`.
 pub const PLUGIN: Plugin<Arc<dyn Bsdf>> =
-    Plugin { name: "conductor", parameters: "material = none, eta, k, specular_reflectance = 1", make };
+    Plugin { name: "conductor", parameters: "material = none, eta, k, ext_eta = 1, specular_reflectance = 1", make };
 
 fn make(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Bsdf>> {
     Ok(Arc::new(Conductor { metal: Metal::load(object, loader)? }))
@@ -31,6 +31,9 @@ impl Metal {
         let names = metals::names();
         let (eta, k) = metals::index_of_refraction(object.choice("material", &names, metals::NONE)?);
         let (eta, k) = (object.index("eta", eta)?, object.index("k", k)?);
+        // Indices are relative to what surrounds the metal.
+        let outside = ior(object, "ext_eta", 1.0)?;
+        let (eta, k) = (eta / outside, k / outside);
         Ok(Self { eta, k, reflectance: loader.texture(object, "specular_reflectance", Rgb::ONE)? })
     }
 

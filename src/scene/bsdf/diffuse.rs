@@ -18,9 +18,9 @@ fn make(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Bsdf>> {
     Ok(Arc::new(Diffuse { reflectance: loader.texture(object, "reflectance", Rgb::splat(0.5))? }))
 }
 
-/// Half-grey.
-pub fn grey() -> Arc<dyn Bsdf> {
-    Arc::new(Diffuse { reflectance: Arc::new(Constant(Rgb::splat(0.5))) })
+/// Grey of one reflectance everywhere.
+pub fn uniform(reflectance: f32) -> Arc<dyn Bsdf> {
+    Arc::new(Diffuse { reflectance: Arc::new(Constant(Rgb::splat(reflectance))) })
 }
 
 struct Diffuse {

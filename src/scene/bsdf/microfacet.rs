@@ -47,7 +47,7 @@ impl Roughness {
     /// From `distribution` and `alpha`, or `alpha_u` and `alpha_v`. Visible normals are always sampled.
     pub fn load(object: &Object, loader: &mut Loader) -> Result<Self> {
         object.ignore(&["sample_visible"]);
-        let kind = Kind::load(object)?;
+        let kind = Kind::load(object, loader)?;
         let mut alpha = |name: &str| loader.texture(object, name, Rgb::splat(0.1));
         match (object.get("alpha_u").is_some(), object.get("alpha_v").is_some()) {
             (false, false) => Ok(Self { kind, u: alpha("alpha")?, v: None }),
@@ -72,9 +72,14 @@ impl Roughness {
 }
 
 impl Kind {
-    /// From `distribution`.
-    pub fn load(object: &Object) -> Result<Self> {
-        Ok([Self::Beckmann, Self::Ggx][object.choice("distribution", &["beckmann", "ggx"], 0)?])
+    /// From `distribution`. The powers of cosines that older files may ask for are nearly Beckmann's distribution.
+    pub fn load(object: &Object, loader: &Loader) -> Result<Self> {
+        let kind = object.choice("distribution", &["beckmann", "ggx", "phong", "as"], 0)?;
+        if kind >= 2 {
+            let what = "the distribution of facets is taken as `beckmann` of the same roughness";
+            loader.warn(&object.loc_of("distribution"), what)?;
+        }
+        Ok(if kind == 1 { Self::Ggx } else { Self::Beckmann })
     }
 }
 

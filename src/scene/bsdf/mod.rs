@@ -3,6 +3,7 @@
 
 mod blendbsdf;
 mod bumpmap;
+mod coating;
 mod conductor;
 mod dielectric;
 mod diffuse;
@@ -12,13 +13,18 @@ pub mod microfacet;
 mod normalmap;
 mod null;
 mod perturbed;
+mod phong;
 mod plastic;
+mod polarizer;
+mod pplastic;
 mod principled;
 mod roughconductor;
 mod roughdielectric;
+mod roughdiffuse;
 mod roughplastic;
 mod thindielectric;
 mod twosided;
+mod ward;
 
 use std::sync::Arc;
 
@@ -32,6 +38,7 @@ use crate::math::{Rgb, Vec2, Vec3, vec3};
 /// The BSDFs of scene files.
 pub const PLUGINS: &[Plugin<Arc<dyn Bsdf>>] = &[
     diffuse::PLUGIN,
+    roughdiffuse::PLUGIN,
     conductor::PLUGIN,
     roughconductor::PLUGIN,
     dielectric::PLUGIN,
@@ -39,19 +46,28 @@ pub const PLUGINS: &[Plugin<Arc<dyn Bsdf>>] = &[
     thindielectric::PLUGIN,
     plastic::PLUGIN,
     roughplastic::PLUGIN,
+    pplastic::PLUGIN,
+    phong::PLUGIN,
+    ward::PLUGIN,
     principled::PLUGIN,
     principled::thin::PLUGIN,
     twosided::PLUGIN,
     mask::PLUGIN,
     blendbsdf::PLUGIN,
+    blendbsdf::MIXTURE,
+    coating::SMOOTH,
+    coating::ROUGH,
     bumpmap::PLUGIN,
     normalmap::PLUGIN,
     null::PLUGIN,
+    polarizer::LINEAR,
+    polarizer::CIRCULAR,
+    polarizer::RETARDER,
 ];
 
-/// The material of a shape that names none.
-pub fn default() -> Arc<dyn Bsdf> {
-    diffuse::grey()
+/// The material of a shape that names none: half-grey, but black for a shape that emits.
+pub fn default(emits: bool) -> Arc<dyn Bsdf> {
+    diffuse::uniform(if emits { 0.0 } else { 0.5 })
 }
 
 /// Kinds of scattering that shift mappings distinguish.

@@ -14,15 +14,17 @@ use crate::scene::texture::Texture;
 /// `normalmap`: red, green and blue in [0, 1] are the normal's x, y and z in [-1, 1]. Image files want `raw`.
 pub const PLUGIN: Plugin<Arc<dyn Bsdf>> = Plugin {
     name: "normalmap",
-    parameters: "normalmap, flip_invalid_normals = true, use_shadowing_function = true, one nested bsdf",
+    parameters: "normalmap or one nested texture, flip_invalid_normals = true, use_shadowing_function = true, one nested bsdf",
     make,
 };
 
 fn make(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Bsdf>> {
-    if object.get("normalmap").is_none() {
-        return Err(object.loc.invalid("`normalmap` needs a texture `normalmap`"));
-    }
-    let normals = Normals(loader.texture(object, "normalmap", vec3(0.5, 0.5, 1.0))?);
+    // In older files the texture has no name.
+    let normals = match object.get("normalmap") {
+        Some(_) => loader.texture(object, "normalmap", vec3(0.5, 0.5, 1.0))?,
+        None => loader.nested_texture(object)?,
+    };
+    let normals = Normals(normals);
     Ok(Arc::new(Perturbed::load(object, loader, normals)?))
 }
 

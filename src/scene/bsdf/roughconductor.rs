@@ -14,7 +14,7 @@ use crate::scene::load::{Loader, Plugin};
 /// `roughconductor`.
 pub const PLUGIN: Plugin<Arc<dyn Bsdf>> = Plugin {
     name: "roughconductor",
-    parameters: "material = none, eta, k, specular_reflectance = 1, alpha = 0.1 or alpha_u and alpha_v, \
+    parameters: "material = none, eta, k, ext_eta = 1, specular_reflectance = 1, alpha = 0.1 or alpha_u and alpha_v, \
         distribution = beckmann (ggx), sample_visible (ignored)",
     make,
 };

@@ -26,7 +26,7 @@ fn make(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Bsdf>> {
     if eta <= 1.0 {
         return Err(object.loc.unsupported("roughplastic with an interior no denser than its exterior"));
     }
-    let facets = Microfacet::new(Kind::load(object)?, object.float("alpha", 0.1)?);
+    let facets = Microfacet::new(Kind::load(object, loader)?, object.float("alpha", 0.1)?);
     let transmittance = RoughTransmittance::new(facets, eta);
     let base = Base::load(object, loader, eta, transmittance.internal)?;
     Ok(Arc::new(RoughPlastic { eta, facets, transmittance, base }))

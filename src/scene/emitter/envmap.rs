@@ -11,7 +11,7 @@ use crate::math::{Mat4, Rgb, Vec2, Vec3, Vec4, luminance, vec2, vec3};
 use crate::scene::Bounds;
 use crate::scene::load::props::Object;
 use crate::scene::load::{Loader, Plugin};
-use crate::scene::texture::{self, Texels};
+use crate::scene::texture::{self, Selection, Texels};
 
 /// `envmap`.
 pub const PLUGIN: Plugin<Box<dyn Emitter>> =
@@ -21,14 +21,23 @@ fn make(object: &Object, loader: &mut Loader) -> Result<Box<dyn Emitter>> {
     let scale = object.float("scale", 1.0)?;
     let to_world = object.transform("to_world")?;
     object.ignore(&["mis_compensation"]);
-    let texels = {
-        let path = loader.file(object)?;
-        loader.texels(path)?
-    };
-    if texels.width < 2 || texels.height < 3 {
-        return Err(object.loc_of("filename").invalid("an environment needs at least 2x3 pixels"));
-    }
+    let texels = enlarged(loader.texels(object, Selection::default())?);
     Ok(Box::new(EnvMap::new(texels, scale, to_world)))
+}
+
+/// An image with enough texels to be interpolated around the sphere: a tiny one gets those between and beside its own.
+fn enlarged(texels: Arc<Texels>) -> Arc<Texels> {
+    let (width, height) = (texels.width, texels.height);
+    if width >= 2 && height >= 3 {
+        return texels;
+    }
+    let (columns, rows) = (width.max(2), height.max(3));
+    let texel = |i: usize| {
+        let (x, y) = (i % columns % width, (i / columns * (height - 1)) as f32 / (rows - 1) as f32);
+        let (above, below) = (y as usize, (y as usize + 1).min(height - 1));
+        texels.texel(x, above).lerp(texels.texel(x, below), y.fract())
+    };
+    Arc::new(Texels::from_colors(columns, (0..columns * rows).map(texel).collect()))
 }
 
 /// The image with its sampling density.
@@ -80,7 +89,7 @@ impl EnvMap {
     fn new(texels: Arc<Texels>, scale: f32, to_world: Mat4) -> Self {
         let (width, height) = (texels.width, texels.height);
         let mut weights = vec![0.0; width * height];
-        let value = |x: usize, y: usize| luminance(texels.texel(x % width, y, false)).max(0.0);
+        let value = |x: usize, y: usize| luminance(texels.texel(x % width, y)).max(0.0);
         for y in 0..height {
             let sine = (PI * (y as f32 + 0.5) / height as f32).sin();
             let (above, below) = (y.saturating_sub(1), (y + 1).min(height - 1));
@@ -112,7 +121,7 @@ impl EnvMap {
         let (right, x) = ((at.x + 1.0) as usize, ((at.x + 1.0) as usize) as f32 - 1.0);
         let (left, right) =
             (if right == 0 { width - 1 } else { (right - 1).min(width - 1) }, if right >= width { 0 } else { right });
-        let [a, b, c, d] = self.texels.square([left, right], [y, y + 1], false);
+        let [a, b, c, d] = self.texels.square([left, right], [y, y + 1]);
         a.lerp(b, at.x - x).lerp(c.lerp(d, at.x - x), at.y - y as f32) * self.scale
     }
 }

@@ -7,7 +7,9 @@ mod constant;
 mod directional;
 mod envmap;
 mod point;
+mod projector;
 mod spot;
+mod sunsky;
 mod tree;
 
 pub use self::area::Area;
@@ -21,8 +23,17 @@ use crate::math::{Rgb, Vec2, Vec3};
 use std::sync::Arc;
 
 /// Emitters that are elements of their own in scene files; `area` is nested in a shape.
-pub const PLUGINS: &[Plugin<Box<dyn Emitter>>] =
-    &[envmap::PLUGIN, constant::PLUGIN, point::PLUGIN, spot::PLUGIN, directional::PLUGIN];
+pub const PLUGINS: &[Plugin<Box<dyn Emitter>>] = &[
+    envmap::PLUGIN,
+    sunsky::SUNSKY,
+    sunsky::SKY,
+    sunsky::SUN,
+    constant::PLUGIN,
+    point::PLUGIN,
+    spot::PLUGIN,
+    projector::PLUGIN,
+    directional::PLUGIN,
+];
 
 /// A point that emits light.
 #[derive(Clone, Copy, Debug)]

@@ -170,6 +170,8 @@ fn single(object: &Object, loader: &mut Loader, (shape_number, emitter_number): 
             }
         }
     }
+    // How derivatives are estimated.
+    object.ignore(&["silhouette_sampling_weight"]);
     object.all_used(plugin.parameters)?;
     // A shape without area (degenerate triangles only) is invisible, and as an emitter it emits nothing.
     if geometry.area() <= 0.0 {
@@ -179,6 +181,6 @@ fn single(object: &Object, loader: &mut Loader, (shape_number, emitter_number): 
         let area = emitter::Area::new(Arc::clone(&geometry), radiance, shape_number);
         Box::new(area) as Box<dyn Emitter>
     });
-    let bsdf = bsdf.unwrap_or_else(bsdf::default);
+    let bsdf = bsdf.unwrap_or_else(|| bsdf::default(emitter.is_some()));
     Ok(Some((Shape { geometry, bsdf, emitter: emitter.as_ref().map(|_| emitter_number) }, emitter)))
 }

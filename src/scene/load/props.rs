@@ -67,6 +67,8 @@ pub struct Object {
     pub class: String,
     /// Its `type`.
     pub plugin: String,
+    /// Its `id`, if it has one.
+    pub id: Option<String>,
     /// Location in the file.
     pub loc: SourceLoc,
     /// Everything in it, in order.
@@ -199,9 +201,14 @@ impl Object {
         }
     }
 
+    /// Properties that were never read.
+    pub fn unused(&self) -> impl Iterator<Item = &Property> {
+        self.properties.iter().filter(|property| !property.used.get())
+    }
+
     /// Fails on the first property that was never read; `supported` lists the known ones.
     pub fn all_used(&self, supported: &str) -> Result<()> {
-        match self.properties.iter().find(|property| !property.used.get()) {
+        match self.unused().next() {
             None => Ok(()),
             Some(property) => {
                 let (class, plugin) = (&self.class, &self.plugin);

@@ -94,6 +94,12 @@ impl Scatters {
         }
     }
 
+    /// Lanes that go straight through.
+    #[inline(always)]
+    pub fn pass(&self) -> Mask {
+        self.lobe.equal(3)
+    }
+
     /// Lanes whose direction is one of a smooth lobe.
     #[inline(always)]
     pub fn smooth(&self) -> Mask {

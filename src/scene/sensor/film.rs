@@ -1,30 +1,93 @@
 //! The part of a film that is rendered.
 
-use crate::error::Result;
+use std::fmt;
+
+use crate::error::{Error, Result};
 use crate::math::{Vec2, vec2};
-use crate::scene::load::props::{Object, Value};
+use crate::scene::load::Loader;
+use crate::scene::load::props::Object;
+
+/// A rectangle of pixels of the full film.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Crop {
+    /// Column of its first pixel.
+    pub x: usize,
+    /// Row of its first pixel.
+    pub y: usize,
+    /// Pixels in a row.
+    pub width: usize,
+    /// Number of rows.
+    pub height: usize,
+}
+
+impl fmt::Display for Crop {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{},{},{}x{}", self.x, self.y, self.width, self.height)
+    }
+}
 
 /// A window of the full film.
 #[derive(Clone, Copy, Debug)]
 pub struct FilmWindow {
     /// Pixels of the window.
     pub size: (usize, usize),
+    /// Whether the file asks for an alpha channel.
+    pub alpha: bool,
     /// The window's upper left corner, as a share of the full film.
     origin: Vec2,
     /// The window's width and height, as a share of the full film.
     pub extent: Vec2,
+    /// The window in pixels and the size of the full film, where it is a part of it.
+    pub part: Option<(Crop, (usize, usize))>,
 }
 
 impl Default for FilmWindow {
     fn default() -> Self {
-        Self { size: (768, 576), origin: Vec2::ZERO, extent: Vec2::ONE }
+        Self { size: (768, 576), alpha: false, origin: Vec2::ZERO, extent: Vec2::ONE, part: None }
     }
 }
 
 impl FilmWindow {
+    /// The film of a file, or the default one, with other numbers of pixels or another window of it.
+    pub fn load(
+        object: Option<&Object>,
+        loader: &Loader,
+        size: Option<(usize, usize)>,
+        crop: Option<Crop>,
+    ) -> Result<Self> {
+        let film = object.map_or(Ok(Self::default()), |object| Self::of_object(object, loader))?;
+        if let Some(crop) = crop {
+            let full = size.unwrap_or(film.part.map_or(film.size, |(_, full)| full));
+            return Ok(Self { alpha: film.alpha, ..Self::new(full, crop)? });
+        }
+        Ok(match size {
+            // Of a part in other numbers of pixels there need not be whole numbers of them before it.
+            Some(size) => Self { size, part: None, ..film },
+            None => film,
+        })
+    }
+
+    fn new(full: (usize, usize), crop: Crop) -> Result<Self> {
+        let fits = |offset: usize, crop: usize, full: usize| offset.checked_add(crop).is_some_and(|end| end <= full);
+        if !fits(crop.x, crop.width, full.0) || !fits(crop.y, crop.height, full.1) {
+            let (Crop { x, y, width, height }, (full_width, full_height)) = (crop, full);
+            let what = format!("a crop window of {width}x{height} at {x},{y} in a film of {full_width}x{full_height}");
+            return Err(Error::Usage(what));
+        }
+        let film = vec2(full.0.max(1) as f32, full.1.max(1) as f32);
+        let window = vec2(crop.width.max(1) as f32, crop.height.max(1) as f32);
+        Ok(Self {
+            size: (crop.width, crop.height),
+            origin: vec2(crop.x as f32, crop.y as f32) / film,
+            extent: window / film,
+            part: (full != (crop.width, crop.height)).then_some((crop, full)),
+            ..Self::default()
+        })
+    }
+
     /// Size and crop window. The output's format is the command line's to say, and pixels are means over their
     /// squares: gradients between pixels are only defined for the box filter.
-    pub fn load(object: &Object) -> Result<Self> {
+    fn of_object(object: &Object, loader: &Loader) -> Result<Self> {
         let dimension = |name: &str, default| {
             let value = object.integer(name, default)?;
             usize::try_from(value).map_err(|_| object.loc_of(name).invalid(format!("`{name}` cannot be negative")))
@@ -32,39 +95,31 @@ impl FilmWindow {
         let (width, height) = (dimension("width", 768)?, dimension("height", 576)?);
         let (x, y) = (dimension("crop_offset_x", 0)?, dimension("crop_offset_y", 0)?);
         let rest = |size: usize, offset: usize| size.saturating_sub(offset) as i64;
-        let size = (dimension("crop_width", rest(width, x))?, dimension("crop_height", rest(height, y))?);
-        let fits = |offset: usize, crop: usize, full: usize| offset.checked_add(crop).is_some_and(|end| end <= full);
-        if !fits(x, size.0, width) || !fits(y, size.1, height) {
-            let what = format!("a crop window of {}x{} at {x},{y} in a film of {width}x{height}", size.0, size.1);
-            return Err(object.loc.invalid(what));
+        let crop = Crop {
+            x,
+            y,
+            width: dimension("crop_width", rest(width, x))?,
+            height: dimension("crop_height", rest(height, y))?,
+        };
+        let window = Self::new((width, height), crop).map_err(|error| object.loc.invalid(error.to_string()))?;
+        let format = object.string("pixel_format", "rgb")?.to_lowercase();
+        if !["rgb", "rgba", "multichannel"].contains(&format.as_str()) {
+            let what = format!("images are written in RGB, not as `{format}`");
+            loader.warn(&object.loc_of("pixel_format"), what)?;
         }
-        object.ignore(&[
-            "file_format",
-            "pixel_format",
-            "component_format",
-            "banner",
-            "high_quality_edges",
-            "sample_border",
-            "gamma",
-            "exposure",
-            "tonemap_method",
-            "compensate",
-        ]);
+        if object.float("exposure", 0.0)? != 0.0 {
+            loader.warn(&object.loc_of("exposure"), "the film's `exposure` is ignored: give it with --exposure")?;
+        }
+        object.ignore(IGNORED);
         for property in object.nested() {
-            if let Value::Object(filter) = &property.value {
+            let nested = loader.resolve(property)?;
+            // Any reconstruction filter is taken as a box.
+            if nested.class == "rfilter" {
                 property.take();
-                if filter.class != "rfilter" {
-                    return Err(filter.loc.unsupported(format!("a {} in a film", filter.class)));
-                }
             }
         }
-        object.all_used(
-            "width, height, crop_width, crop_height, crop_offset_x, crop_offset_y, file_format, pixel_format, \
-             component_format, rfilter (taken as box)",
-        )?;
-        let full = vec2(width.max(1) as f32, height.max(1) as f32);
-        let window = vec2(size.0.max(1) as f32, size.1.max(1) as f32);
-        Ok(Self { size, origin: vec2(x as f32, y as f32) / full, extent: window / full })
+        loader.warn_unused(object)?;
+        Ok(Self { alpha: format.ends_with('a') && format != "multichannel", ..window })
     }
 
     /// A point of the window as a point of the full film, both in [0, 1]².
@@ -72,3 +127,22 @@ impl FilmWindow {
         self.origin + at * self.extent
     }
 }
+
+/// Properties of films that say how files are written.
+const IGNORED: &[&str] = &[
+    "file_format",
+    "component_format",
+    "banner",
+    "high_quality_edges",
+    "sample_border",
+    "gamma",
+    "tonemap_method",
+    "compensate",
+    "attach_log",
+    "size",
+    "variable",
+    "digits",
+    "key",
+    "burn",
+    "label",
+];

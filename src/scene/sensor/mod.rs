@@ -2,7 +2,10 @@
 
 mod film;
 
+pub use self::film::Crop;
 use self::film::FilmWindow;
+use std::rc::Rc;
+
 use crate::error::Result;
 use crate::math::lanes::{Lanes, Lanes3};
 use crate::math::{Mat4, Vec2, Vec3, Vec4, vec2};
@@ -10,6 +13,25 @@ use crate::scene::Ray;
 use crate::scene::load::Loader;
 use crate::scene::load::props::Object;
 use crate::scene::packet::{self, Rays};
+
+/// Films with more pixels than this are taken for a mistake.
+const MAX_PIXELS: u64 = 1 << 28;
+
+/// A sensor as a file names it.
+#[derive(Clone, Debug)]
+pub struct SensorInfo {
+    /// Its `id`, if it has one.
+    pub id: Option<String>,
+    /// Its type.
+    pub plugin: String,
+}
+
+impl SensorInfo {
+    /// Name and type of a sensor, whether or not it can be built.
+    pub fn new(object: &Object) -> Self {
+        Self { id: object.id.clone(), plugin: object.plugin.clone() }
+    }
+}
 
 /// Looks along its local +z with +x to the left and +y up.
 #[derive(Clone, Debug)]
@@ -31,6 +53,25 @@ pub struct Sensor {
     far: f32,
 }
 
+impl Default for Sensor {
+    /// At the origin with a default film.
+    fn default() -> Self {
+        let film = FilmWindow::default();
+        Self {
+            width: film.size.0,
+            height: film.size.1,
+            spp: DEFAULT_SPP,
+            film,
+            to_world: Mat4::IDENTITY,
+            half_extent: Vec2::ONE,
+            principal_point: Vec2::ZERO,
+            projection: Projection::Pinhole,
+            near: NEAR,
+            far: FAR,
+        }
+    }
+}
+
 /// How a film position becomes a ray.
 #[derive(Clone, Copy, Debug)]
 enum Projection {
@@ -41,6 +82,12 @@ enum Projection {
     /// Along z everywhere.
     Parallel,
 }
+
+/// Samples per pixel of files that do not say.
+const DEFAULT_SPP: u32 = 64;
+/// The clip planes of files that do not say.
+const NEAR: f32 = 1e-2;
+const FAR: f32 = 1e4;
 
 const VIEW: &str = "fov or focal_length = 50mm, fov_axis = x (y, diagonal, smaller, larger), to_world, near_clip = 0.01, \
     far_clip = 10000, principal_point_offset_x = 0, principal_point_offset_y = 0, film, sampler";
@@ -55,22 +102,23 @@ pub const PLUGINS: &[(&str, &str)] = &[
     ("orthographic", "to_world, near_clip = 0.01, far_clip = 10000, film, sampler"),
 ];
 
-/// Builds the sensor; `size` overrides the film's.
-pub fn load(object: &Object, loader: &mut Loader, size: Option<(usize, usize)>, max_pixels: u64) -> Result<Sensor> {
+/// Builds the sensor, with other numbers of pixels or another window of its film.
+pub fn load(object: &Object, loader: &Loader, size: Option<(usize, usize)>, crop: Option<Crop>) -> Result<Sensor> {
     let Some((_, parameters)) = PLUGINS.iter().find(|(name, _)| *name == object.plugin) else {
         let names: Vec<_> = PLUGINS.iter().map(|(name, _)| *name).collect();
         let what = format!("sensor `{}` is not known; there are {}", object.plugin, names.join(", "));
         return Err(object.loc.unsupported(what));
     };
     let (film, spp) = film_and_spp(object, loader)?;
-    let (width, height) = size.unwrap_or(film.size);
+    let film = FilmWindow::load(film.as_deref(), loader, size, crop)?;
+    let (width, height) = film.size;
     let pixels = (width as u64).saturating_mul(height as u64);
-    if pixels == 0 || pixels > max_pixels {
-        return Err(object.loc.invalid(format!("a film of {width}x{height} pixels; it may have 1 to {max_pixels}")));
+    if pixels == 0 || pixels > MAX_PIXELS {
+        return Err(object.loc.invalid(format!("a film of {width}x{height} pixels; it may have 1 to {MAX_PIXELS}")));
     }
     // The window's own shape, were it as large as the whole film.
     let aspect = (width as f32 / film.extent.x) / (height as f32 / film.extent.y);
-    let (near, far) = (object.float("near_clip", 1e-2)?, object.float("far_clip", 1e4)?);
+    let (near, far) = (object.float("near_clip", NEAR)?, object.float("far_clip", FAR)?);
     if !(near > 0.0 && far > near) {
         return Err(object.loc_of("near_clip").invalid(format!("clip planes at {near} and {far}")));
     }
@@ -97,19 +145,15 @@ pub fn load(object: &Object, loader: &mut Loader, size: Option<(usize, usize)>, 
     Ok(sensor)
 }
 
-fn film_and_spp(object: &Object, loader: &Loader) -> Result<(FilmWindow, u32)> {
-    let (mut film, mut spp) = (FilmWindow::default(), 64);
+fn film_and_spp(object: &Object, loader: &Loader) -> Result<(Option<Rc<Object>>, u32)> {
+    let (mut film, mut spp) = (None, i64::from(DEFAULT_SPP));
     for property in object.nested() {
         let nested = loader.resolve(property)?;
         property.take();
         match nested.class.as_str() {
-            "film" => film = FilmWindow::load(&nested)?,
-            "sampler" => {
-                spp = nested.integer("sample_count", 64)?;
-                // Sample patterns are ours.
-                nested.ignore(&["seed", "jitter", "scramble", "dimension"]);
-                nested.all_used("sample_count, seed, jitter, scramble, dimension")?;
-            }
+            "film" => film = Some(nested),
+            // Sample patterns are ours.
+            "sampler" => spp = nested.integer("sample_count", spp)?,
             other => return Err(nested.loc.unsupported(format!("a {other} in a sensor; it takes film and sampler"))),
         }
     }
@@ -133,7 +177,7 @@ fn projection(object: &Object, far: f32) -> Result<Projection> {
 }
 
 /// Half the film's width at distance one.
-fn half_width(object: &Object, aspect: f32) -> Result<f32> {
+pub fn half_width(object: &Object, aspect: f32) -> Result<f32> {
     let diagonal = (1.0 + 1.0 / (aspect * aspect)).sqrt();
     let focal_length = object.string("focal_length", "")?;
     if !focal_length.is_empty() {
@@ -171,6 +215,16 @@ impl Sensor {
     /// [`Sensor::ray`] for sixteen film positions.
     pub fn rays(&self, film: [Lanes; 2], lens: [Lanes; 2]) -> Rays {
         view(self, film, lens)
+    }
+
+    /// Whether the file asks for an alpha channel.
+    pub fn wants_alpha(&self) -> bool {
+        self.film.alpha
+    }
+
+    /// The pixels of the film that are rendered and the size of the whole film, where these are a part of it.
+    pub fn part(&self) -> Option<(Crop, (usize, usize))> {
+        self.film.part
     }
 
     /// Whether the lens has an extent, so that pixels differ by their positions on it, too.

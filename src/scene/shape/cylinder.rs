@@ -2,7 +2,8 @@
 
 use std::f32::consts::TAU;
 
-use super::{Bounds, Geometry};
+use super::mesh::{Mesh, Placement};
+use super::{Bounds, Geometry, tessellation};
 use crate::error::Result;
 use crate::ffi::embree::{Hit, Quadric, QuadricKind};
 use crate::math::{Frame, Mat4, Vec2, Vec3, vec2, vec3};
@@ -29,8 +30,9 @@ fn make(object: &Object, loader: &mut Loader) -> Result<Geometry> {
     let [x, y, z] = [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| to_world.transform_vector3(axis));
     let skewed = |a: Vec3, b: Vec3| a.dot(b).abs() > 1e-3 * a.length() * b.length();
     if (x.length() - y.length()).abs() > 1e-3 * x.length() || skewed(x, y) || skewed(x, z) || skewed(y, z) {
-        let what = "a cylinder that is sheared or scaled unevenly across its axis";
-        return Err(object.loc_of("to_world").unsupported(what));
+        loader.warn(&object.loc_of("to_world"), "a cylinder scaled unevenly is traced as a mesh of triangles")?;
+        let placement = Placement { to_world, face_normals: false, flip_normals: side < 0.0 };
+        return loader.finite(object, Geometry::Mesh(Mesh::new(tessellation::cylinder(), placement)));
     }
     loader.finite(object, Geometry::Cylinder(Cylinder { to_world, to_object: to_world.inverse(), side }))
 }

@@ -3,25 +3,29 @@
 use super::Geometry;
 use super::mesh::{Mesh, Placement};
 use crate::error::Result;
+use crate::scene::load::mesh::smooth;
 use crate::scene::load::props::Object;
 use crate::scene::load::{Loader, Plugin};
 
 /// `obj`: texture coordinates count from the bottom, so they are turned over unless told otherwise.
 pub const OBJ: Plugin<Geometry> = Plugin {
     name: "obj",
-    parameters: "filename, to_world, face_normals = false, flip_normals = false, flip_tex_coords = true",
+    parameters: "filename, to_world, face_normals = false, flip_normals = false, flip_tex_coords = true, \
+        max_smooth_angle",
     make,
 };
 /// `ply`.
 pub const PLY: Plugin<Geometry> = Plugin {
     name: "ply",
-    parameters: "filename, to_world, face_normals = false, flip_normals = false, flip_tex_coords = false",
+    parameters: "filename, to_world, face_normals = false, flip_normals = false, flip_tex_coords = false, \
+        max_smooth_angle",
     make,
 };
 /// `serialized`.
 pub const SERIALIZED: Plugin<Geometry> = Plugin {
     name: "serialized",
-    parameters: "filename, shape_index = 0, to_world, face_normals = false, flip_normals = false, flip_tex_coords = false",
+    parameters: "filename, shape_index = 0, to_world, face_normals = false, flip_normals = false, \
+        flip_tex_coords = false, max_smooth_angle",
     make,
 };
 
@@ -30,7 +34,16 @@ fn make(object: &Object, loader: &mut Loader) -> Result<Geometry> {
     let face_normals = object.boolean("face_normals", false)?;
     let flip_normals = object.boolean("flip_normals", false)?;
     let flip_tex_coords = object.boolean("flip_tex_coords", object.plugin == "obj")?;
+    let smooth_up_to = object.get("max_smooth_angle").map(|_| object.float("max_smooth_angle", 180.0)).transpose()?;
+    if smooth_up_to.is_some() && face_normals {
+        return Err(object.loc_of("max_smooth_angle").invalid("give either `max_smooth_angle` or `face_normals`"));
+    }
+    // Older files say how a mesh is cut into several, each with the materials of the file.
+    object.ignore(&["collapse", "load_materials", "srgb"]);
     let mut data = loader.mesh(object)?;
+    if let Some(degrees) = smooth_up_to {
+        data = smooth::split(data, degrees);
+    }
     if flip_tex_coords {
         data.uvs.iter_mut().for_each(|uv| uv.y = 1.0 - uv.y);
     }

@@ -7,6 +7,7 @@ mod files;
 pub mod mesh;
 mod rectangle;
 pub mod sphere;
+mod tessellation;
 
 use std::f32::consts::PI;
 

@@ -2,7 +2,8 @@
 
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
 
-use super::{Bounds, Geometry};
+use super::mesh::{Mesh, Placement};
+use super::{Bounds, Geometry, tessellation};
 use crate::error::Result;
 use crate::ffi::embree::Hit;
 use crate::math::{Frame, Mat4, Vec2, Vec3, vec2, vec3, warp};
@@ -21,11 +22,15 @@ fn make(object: &Object, loader: &mut Loader) -> Result<Geometry> {
     let to_world = object.transform("to_world")?;
     let flip = object.boolean("flip_normals", false)?;
     let axes = [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| to_world.transform_vector3(axis).length());
-    if axes.iter().any(|axis| (axis - axes[0]).abs() > 1e-3 * axes[0]) {
-        return Err(object.loc_of("to_world").unsupported("a sphere scaled unevenly (an ellipsoid)"));
-    }
     if radius <= 0.0 || !radius.is_finite() {
         return Err(object.loc_of("radius").invalid("`radius` must be positive"));
+    }
+    let skewed = axes.iter().any(|axis| (axis - axes[0]).abs() > 1e-3 * axes[0]) || is_sheared(to_world);
+    if skewed {
+        loader.warn(&object.loc_of("to_world"), "a sphere scaled unevenly is traced as a mesh of triangles")?;
+        let placed = to_world * Mat4::from_translation(center) * Mat4::from_scale(Vec3::splat(radius));
+        let placement = Placement { to_world: placed, face_normals: false, flip_normals: flip };
+        return loader.finite(object, Geometry::Mesh(Mesh::new(tessellation::sphere(), placement)));
     }
     let mirrored = to_world.determinant() < 0.0;
     loader.finite(
@@ -37,6 +42,12 @@ fn make(object: &Object, loader: &mut Loader) -> Result<Geometry> {
             side: if flip != mirrored { -1.0 } else { 1.0 },
         }),
     )
+}
+
+/// Whether a transform bends right angles.
+fn is_sheared(to_world: Mat4) -> bool {
+    let [x, y, z] = [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| to_world.transform_vector3(axis).normalize_or_zero());
+    [x.dot(y), x.dot(z), y.dot(z)].iter().any(|cosine| cosine.abs() > 1e-3)
 }
 
 /// One sphere in world space.

@@ -3,11 +3,13 @@
 mod bitmap;
 mod checkerboard;
 mod mesh_attribute;
+mod scale;
+pub mod spectra;
 mod texels;
 mod uniform;
 
 pub use self::mesh_attribute::{Unbound, bind};
-pub use self::texels::{Memory, Texels};
+pub use self::texels::{Memory, Selection, Texels};
 use super::load::Plugin;
 use super::load::props::Object;
 use crate::error::Result;
@@ -15,8 +17,19 @@ use crate::math::{Mat4, Rgb, Vec2, luminance, vec2};
 use std::sync::Arc;
 
 /// The textures of scene files.
-pub const PLUGINS: &[Plugin<Arc<dyn Texture>>] =
-    &[bitmap::PLUGIN, checkerboard::PLUGIN, mesh_attribute::PLUGIN, uniform::UNIFORM, uniform::RAW];
+pub const PLUGINS: &[Plugin<Arc<dyn Texture>>] = &[
+    bitmap::PLUGIN,
+    checkerboard::PLUGIN,
+    mesh_attribute::PLUGIN,
+    scale::PLUGIN,
+    uniform::UNIFORM,
+    uniform::RAW,
+    spectra::D65,
+    spectra::SRGB,
+    spectra::BLACKBODY,
+    spectra::REGULAR,
+    spectra::IRREGULAR,
+];
 
 /// A point of a shape, as textures see it.
 #[derive(Clone, Copy, Debug, Default)]
@@ -48,6 +61,16 @@ pub trait Texture: Send + Sync {
 
     /// Average of [`Texture::scalar`] over the unit square; steers sampling only.
     fn mean(&self) -> f32;
+
+    /// Columns and rows, of an image.
+    fn resolution(&self) -> Option<Vec2> {
+        None
+    }
+
+    /// Largest value of every channel, or an upper bound of it.
+    fn largest(&self) -> Rgb {
+        self.constant().unwrap_or(Rgb::ONE)
+    }
 
     /// The colour, if it is the same everywhere.
     fn constant(&self) -> Option<Rgb> {

@@ -1,13 +1,24 @@
 //! Image files as texels: in memory while there is room, otherwise through a cache of tiles.
 
 use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, OnceLock};
 
 use crate::error::Result;
-use crate::image::io::{self, CachedTexture, ImageFile, TextureSystem};
+use crate::image::channels::{ColorChannels, Decoding};
+use crate::image::io::{CachedTexture, ImageFile, TextureSystem};
 use crate::math::{Rgb, srgb_decode, vec3};
 
-/// An image as it is stored: three channels, alpha dropped, grey spread over all three.
+/// Part of an image file that is read.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Selection {
+    /// Take integers as they are instead of decoding sRGB.
+    pub raw: bool,
+    /// A single channel in place of the colours.
+    pub channel: Option<String>,
+}
+
+/// An image as linear colours: alpha dropped, grey spread over all three channels.
 pub struct Texels {
     /// Pixels in a row.
     pub width: usize,
@@ -17,14 +28,14 @@ pub struct Texels {
 }
 
 enum Samples {
-    Byte(Vec<[u8; 3]>),
+    /// Eight bits, with the linear values of all bytes.
+    Byte(Vec<[u8; 3]>, &'static [f32; 256]),
     Float(Vec<Rgb>),
     /// Beyond the memory bound.
     Cached {
         texture: CachedTexture,
         origin: (i32, i32),
-        order: [usize; 3],
-        eight_bit: bool,
+        colors: ColorChannels,
     },
 }
 
@@ -54,54 +65,57 @@ impl Memory {
 }
 
 impl Texels {
-    /// Reads an image file, or only its header when there is no room for the rest.
-    pub fn read(path: &Path, memory: &mut Memory) -> Result<Self> {
+    /// Reads an image file, or only its header when there is no room for the rest. Also gives the number of texels that
+    /// are not finite in the file: infinity counts as the largest half float, and what is no number as zero.
+    pub fn read(path: &Path, selection: &Selection, memory: &mut Memory) -> Result<(Self, usize)> {
         let file = ImageFile::open(path)?;
-        let (width, height, eight_bit) = (file.width, file.height, file.eight_bit);
-        let order = io::rgb_channels(path, &file.channels, 2)?;
+        let colors = match &selection.channel {
+            Some(channel) => ColorChannels::single(&file, path, channel, selection.raw)?,
+            None => ColorChannels::of(&file, path, selection.raw)?,
+        };
+        let (width, height, order) = (file.width, file.height, colors.order);
+        let eight_bit = colors.is_eight_bit(&file);
         let size = (width * height * if eight_bit { 3 } else { 12 }) as u64;
         if size > memory.left && order.iter().all(|&channel| channel < MAX_CHANNELS) {
             if let Some(system) = memory.system() {
                 let texture = CachedTexture::open(&system, path)?;
-                let samples = Samples::Cached { texture, origin: file.origin, order, eight_bit };
-                return Ok(Self { width, height, samples });
+                let samples = Samples::Cached { texture, origin: file.origin, colors };
+                return Ok((Self { width, height, samples }, 0));
             }
         }
         memory.left = memory.left.saturating_sub(size);
-        let count = file.channels.len();
+        let (count, infinite) = (file.channels.len(), AtomicUsize::new(0));
         let samples = if eight_bit {
             let bytes = file.bytes()?;
-            Samples::Byte(bytes.chunks_exact(count).map(|pixel| order.map(|channel| pixel[channel])).collect())
+            let texels = bytes.chunks_exact(count).map(|pixel| order.map(|channel| pixel[channel])).collect();
+            Samples::Byte(texels, decoded(colors.decoding[0]))
         } else {
-            let floats = file.floats()?;
-            let texel = |pixel: &[f32]| finite(Rgb::from_array(order.map(|channel| pixel[channel])));
-            Samples::Float(floats.chunks_exact(count).map(texel).collect())
+            let texel = |pixel: &[f32]| {
+                let color = colors.color(pixel);
+                infinite.fetch_add(usize::from(!color.is_finite()), Ordering::Relaxed);
+                finite(color)
+            };
+            Samples::Float(file.floats()?.chunks_exact(count).map(texel).collect())
         };
-        Ok(Self { width, height, samples })
+        Ok((Self { width, height, samples }, infinite.into_inner()))
     }
 
     /// Texels that are already linear colours.
-    #[cfg(test)]
     pub fn from_colors(width: usize, colors: Vec<Rgb>) -> Self {
         Self { width, height: colors.len() / width, samples: Samples::Float(colors) }
     }
 
-    /// Linear colour of a texel. `raw`: take eight-bit values as they are instead of decoding sRGB.
+    /// Linear colour of a texel.
     #[inline]
-    pub fn texel(&self, x: usize, y: usize, raw: bool) -> Rgb {
+    pub fn texel(&self, x: usize, y: usize) -> Rgb {
         match &self.samples {
             Samples::Float(texels) => texels[y * self.width + x],
-            Samples::Byte(texels) => decode(texels[y * self.width + x], raw),
-            Samples::Cached { texture, origin, order, eight_bit } => {
+            Samples::Byte(texels, table) => decode(texels[y * self.width + x], table),
+            Samples::Cached { texture, origin, colors } => {
                 let mut samples = [0.0; MAX_CHANNELS];
-                let count = order.iter().max().map_or(1, |&last| last + 1);
+                let count = colors.order.iter().max().map_or(1, |&last| last + 1);
                 texture.texel(origin.0 + x as i32, origin.1 + y as i32, &mut samples[..count]);
-                let color = order.map(|channel| samples[channel]);
-                if *eight_bit {
-                    decode(color.map(|value| (value * 255.0).round() as u8), raw)
-                } else {
-                    finite(Rgb::from_array(color))
-                }
+                finite(colors.color(&samples))
             }
         }
     }
@@ -110,7 +124,7 @@ impl Texels {
 impl Texels {
     /// Linear colours of the texels in two columns of two rows.
     #[inline]
-    pub fn square(&self, [left, right]: [usize; 2], [above, below]: [usize; 2], raw: bool) -> [Rgb; 4] {
+    pub fn square(&self, [left, right]: [usize; 2], [above, below]: [usize; 2]) -> [Rgb; 4] {
         let (above, below) = (above * self.width, below * self.width);
         // Four calls: mapping an array is not inlined.
         let of = |texel: &dyn Fn(usize) -> Rgb| {
@@ -118,45 +132,44 @@ impl Texels {
         };
         match &self.samples {
             Samples::Float(texels) => of(&|index| texels[index]),
-            Samples::Byte(texels) => {
-                let table = decoded(raw);
-                of(&|index| {
-                    let [r, g, b] = texels[index];
-                    vec3(table[r as usize], table[g as usize], table[b as usize])
-                })
-            }
-            Samples::Cached { .. } => of(&|index| self.texel(index % self.width, index / self.width, raw)),
+            Samples::Byte(texels, table) => of(&|index| decode(texels[index], table)),
+            Samples::Cached { .. } => of(&|index| self.texel(index % self.width, index / self.width)),
         }
     }
 }
 
+/// The largest half float, which a sun that was brighter is clipped to.
+const BRIGHTEST: f32 = 65504.0;
+
 /// A texel that is not finite would spoil every path that hits it.
 fn finite(color: Rgb) -> Rgb {
-    Rgb::from_array(color.to_array().map(|value| if value.is_finite() { value } else { 0.0 }))
+    let finite = |value: f32| match value {
+        f32::INFINITY => BRIGHTEST,
+        value if value.is_finite() => value,
+        _ => 0.0,
+    };
+    if color.is_finite() { color } else { Rgb::from_array(color.to_array().map(finite)) }
 }
 
 #[inline]
-fn decode([r, g, b]: [u8; 3], raw: bool) -> Rgb {
-    let table = decoded(raw);
+fn decode([r, g, b]: [u8; 3], table: &[f32; 256]) -> Rgb {
     vec3(table[r as usize], table[g as usize], table[b as usize])
 }
 
 /// Linear values of all bytes.
-#[inline]
-fn decoded(raw: bool) -> &'static [f32; 256] {
+fn decoded(decoding: Decoding) -> &'static [f32; 256] {
     static LINEAR: OnceLock<[f32; 256]> = OnceLock::new();
     static SRGB: OnceLock<[f32; 256]> = OnceLock::new();
-    if raw {
-        LINEAR.get_or_init(|| std::array::from_fn(|i| i as f32 / 255.0))
-    } else {
-        SRGB.get_or_init(|| std::array::from_fn(|i| srgb_decode(i as f32 / 255.0)))
+    match decoding {
+        Decoding::Srgb => SRGB.get_or_init(|| std::array::from_fn(|i| srgb_decode(i as f32 / 255.0))),
+        Decoding::Linear | Decoding::Integer => LINEAR.get_or_init(|| std::array::from_fn(|i| i as f32 / 255.0)),
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::image::Image;
+    use crate::image::{Image, io};
 
     #[test]
     fn texels_are_the_same_in_memory_and_beyond_its_bound() {
@@ -164,14 +177,14 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         for name in ["a.png", "a.exr"] {
             let path = folder.path().join(name);
-            io::write_color(&path, &image, &[], &[]).unwrap();
-            let held = Texels::read(&path, &mut Memory::new(1 << 20)).unwrap();
-            let cached = Texels::read(&path, &mut Memory::new(100)).unwrap();
-            assert!(
-                matches!(cached.samples, Samples::Cached { .. }) && !matches!(held.samples, Samples::Cached { .. })
-            );
+            io::write_color(&path, &image, &io::Extras::default()).unwrap();
+            let read =
+                |raw, bytes| Texels::read(&path, &Selection { raw, channel: None }, &mut Memory::new(bytes)).unwrap().0;
             for (x, y, raw) in [(0, 0, false), (89, 69, true), (40, 65, false), (70, 3, true)] {
-                assert_eq!(held.texel(x, y, raw), cached.texel(x, y, raw), "{name} {x} {y}");
+                let (held, cached) = (read(raw, 1 << 20), read(raw, 100));
+                assert!(matches!(cached.samples, Samples::Cached { .. }));
+                assert!(!matches!(held.samples, Samples::Cached { .. }));
+                assert!(held.texel(x, y).distance(cached.texel(x, y)) < 1e-6, "{name} {x} {y}");
             }
         }
     }

@@ -2,7 +2,9 @@
 
 mod obj;
 mod ply;
+mod polygon;
 mod serialized;
+pub mod smooth;
 
 use std::path::Path;
 
@@ -23,11 +25,6 @@ pub struct MeshData {
     pub triangles: Vec<[u32; 3]>,
     /// Values by name: one a vertex under `vertex_...`, one a triangle under `face_...`.
     pub attributes: Vec<(String, Vec<Rgb>)>,
-}
-
-/// A face as triangles around its first corner.
-fn fan(corners: &[u32]) -> impl Iterator<Item = [u32; 3]> {
-    corners.windows(2).skip(1).map(|pair| [corners[0], pair[0], pair[1]])
 }
 
 /// The mesh in the bytes of a file; `index` chooses among those of a serialized file. `path` is for messages.

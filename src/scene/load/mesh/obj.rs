@@ -4,6 +4,7 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use super::MeshData;
+use super::polygon::Triangulation;
 use crate::error::{Result, SourceLoc};
 use crate::math::{Vec2, Vec3, vec2, vec3};
 
@@ -11,15 +12,37 @@ use crate::math::{Vec2, Vec3, vec2, vec3};
 type Corner = (usize, Option<usize>, Option<usize>);
 
 /// Reads a mesh. Corners that agree in position, texture coordinate and normal share a vertex; faces with more than
-/// three corners become fans, and negative numbers count from the latest entry. A corner without a texture coordinate
-/// or normal, in a file that has them, gets zero.
+/// three corners become triangles, and negative numbers count from the latest entry. A corner without a texture
+/// coordinate or normal, in a file that has them, gets zero.
 pub fn read(bytes: &[u8], path: &Path) -> Result<MeshData> {
-    let text = String::from_utf8_lossy(bytes);
+    let text = String::from_utf8_lossy(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes));
     let mut file = File::default();
-    for (number, line) in (1..).zip(text.lines()) {
+    let mut lines = (1..).zip(text.lines());
+    while let Some((number, line)) = lines.next() {
+        let mut joined = String::new();
+        let line = match without_comment(line).strip_suffix('\\') {
+            None => without_comment(line),
+            Some(start) => {
+                joined.push_str(start);
+                // A line that ends in a backslash goes on in the next one.
+                for (_, next) in lines.by_ref() {
+                    let next = without_comment(next);
+                    joined.push(' ');
+                    joined.push_str(next.strip_suffix('\\').unwrap_or(next));
+                    if !next.ends_with('\\') {
+                        break;
+                    }
+                }
+                &joined
+            }
+        };
         file.line(line).map_err(|what| SourceLoc::line(path, number).invalid(what))?;
     }
     Ok(file.mesh)
+}
+
+fn without_comment(line: &str) -> &str {
+    line.split_once('#').map_or(line, |(code, _)| code).trim_end()
 }
 
 #[derive(Default)]
@@ -28,6 +51,7 @@ struct File {
     uvs: Vec<Vec2>,
     normals: Vec<Vec3>,
     vertices: HashMap<Corner, u32>,
+    triangulation: Triangulation,
     mesh: MeshData,
 }
 
@@ -43,7 +67,8 @@ impl File {
             }
             Some("f") => {
                 let corners = words.map(|word| self.vertex(word)).collect::<Result<Vec<_>, _>>()?;
-                self.mesh.triangles.extend(super::fan(&corners));
+                let Self { triangulation, mesh, .. } = self;
+                triangulation.add(&corners, &mesh.positions, &mut mesh.triangles);
             }
             _ => {}
         }
@@ -117,6 +142,15 @@ mod tests {
         assert_eq!((partial.uvs[0], partial.uvs[3], partial.normals[5]), (Vec2::ZERO, vec2(0.25, 0.5), Vec3::Z));
         let fan = parse(&format!("{head}f -4 -3 -2 -1\n")).unwrap();
         assert_eq!(fan.triangles, [[0, 1, 2], [0, 2, 3]]);
+    }
+
+    #[test]
+    fn lines_may_be_commented_continued_and_marked() {
+        let text = "\u{feff}v 0 0 0 # first\nv 1 0 \\ # more\n 0\nv 1 1 \\\n \\\n0#last\nf 1 2 3 # a face\n# v x\n";
+        let mesh = parse(text).unwrap();
+        assert_eq!((mesh.positions.len(), mesh.triangles.len()), (3, 1));
+        assert_eq!(mesh.positions[2], vec3(1.0, 1.0, 0.0));
+        assert!(parse("v 0 0 0\nf 1 \\\n 1 2\n").unwrap_err().to_string().contains(":2: entry 2 of 1"));
     }
 
     #[test]

@@ -6,6 +6,7 @@ use ply_rs_bw::parser::{ParseError, Parser, Reader};
 use ply_rs_bw::ply::{ElementDef, Property, PropertyAccess, PropertyAccessResult, PropertyType};
 
 use super::MeshData;
+use super::polygon::Triangulation;
 use crate::error::{Result, SourceLoc};
 use crate::math::{Rgb, Vec3, vec2};
 
@@ -131,58 +132,66 @@ fn attributes<'a>(
     found.into_iter().map(|(stem, at)| (format!("{prefix}{stem}"), values(at))).collect()
 }
 
-/// Reads a mesh; faces with more than three corners become fans.
+/// Reads a mesh; elements may come in any order, and faces may have any number of corners.
 pub fn read(bytes: &[u8], path: &Path) -> Result<MeshData> {
     let loc = SourceLoc::file(path);
     let mut reader = Reader::new(bytes);
     let damaged = |error: ParseError| loc.invalid(format!("not a readable PLY file: {error}"));
     let header = Parser::<Vertex>::new().read_header(&mut reader).map_err(damaged)?;
-    let mut mesh = MeshData::default();
+    let (mut mesh, mut faces) = (MeshData::default(), None);
     for (name, element) in &header.elements {
         // Every entry takes at least one byte: a larger count is a damaged header.
         if element.count > bytes.len() {
             return Err(loc.invalid(format!("{} entries of `{name}` do not fit in the file", element.count)));
         }
-        match name.as_str() {
-            "vertex" => {
-                let parser = Parser::<Vertex>::new();
-                let vertices = parser.read_payload_for_element(&mut reader, element, &header).map_err(damaged)?;
-                let has = |key: &str| element.properties.contains_key(key);
-                if has("nx") && has("ny") && has("nz") {
-                    mesh.normals = vertices.iter().map(|vertex| vertex.normal).collect();
-                }
-                let names = columns(element, POSITION);
-                let pairs = UVS.map(|pair| pair.map(|name| position(&names, name)));
-                if let Some([Some(u), Some(v)]) = pairs.into_iter().find(|pair| pair.iter().all(Option::is_some)) {
-                    let value = |row: &Vertex, at: usize| row.others.get(at).copied().unwrap_or_default();
-                    mesh.uvs = vertices.iter().map(|row| vec2(value(row, u), value(row, v))).collect();
-                }
-                mesh.attributes.extend(attributes("vertex_", &names, vertices.iter().map(|vertex| &*vertex.others)));
-                mesh.positions = vertices.into_iter().map(|vertex| vertex.position).collect();
-            }
-            "face" => {
-                let parser = Parser::<Face>::new();
-                let faces = parser.read_payload_for_element(&mut reader, element, &header).map_err(damaged)?;
-                // One entry a triangle, for faces that are fans.
-                let mut others = Vec::new();
-                for face in &faces {
-                    let corner = |index: i64| {
-                        let fits = usize::try_from(index).is_ok_and(|index| index < mesh.positions.len());
-                        let what = || loc.invalid(format!("a face names vertex {index} of {}", mesh.positions.len()));
-                        if fits { Ok(index as u32) } else { Err(what()) }
-                    };
-                    let corners = face.corners.iter().copied().map(corner).collect::<Result<Vec<_>>>()?;
-                    mesh.triangles.extend(super::fan(&corners));
-                    others.resize(mesh.triangles.len(), &*face.others);
-                }
-                mesh.attributes.extend(attributes("face_", &columns(element, &[]), others.into_iter()));
-            }
-            _ => {
-                Parser::<Face>::new().read_payload_for_element(&mut reader, element, &header).map_err(damaged)?;
-            }
+        if name == "vertex" {
+            let parser = Parser::<Vertex>::new();
+            let vertices = parser.read_payload_for_element(&mut reader, element, &header).map_err(damaged)?;
+            add_vertices(&mut mesh, vertices, element);
+            continue;
+        }
+        let entries = Parser::<Face>::new().read_payload_for_element(&mut reader, element, &header).map_err(damaged)?;
+        if name == "face" {
+            faces = Some((entries, element));
         }
     }
+    if let Some((faces, element)) = faces {
+        add_faces(&mut mesh, &faces, element, &loc)?;
+    }
     Ok(mesh)
+}
+
+fn add_vertices(mesh: &mut MeshData, vertices: Vec<Vertex>, element: &ElementDef) {
+    let has = |key: &str| element.properties.contains_key(key);
+    if has("nx") && has("ny") && has("nz") {
+        mesh.normals = vertices.iter().map(|vertex| vertex.normal).collect();
+    }
+    let names = columns(element, POSITION);
+    let pairs = UVS.map(|pair| pair.map(|name| position(&names, name)));
+    if let Some([Some(u), Some(v)]) = pairs.into_iter().find(|pair| pair.iter().all(Option::is_some)) {
+        let value = |row: &Vertex, at: usize| row.others.get(at).copied().unwrap_or_default();
+        mesh.uvs = vertices.iter().map(|row| vec2(value(row, u), value(row, v))).collect();
+    }
+    mesh.attributes.extend(attributes("vertex_", &names, vertices.iter().map(|vertex| &*vertex.others)));
+    mesh.positions = vertices.into_iter().map(|vertex| vertex.position).collect();
+}
+
+fn add_faces(mesh: &mut MeshData, faces: &[Face], element: &ElementDef, loc: &SourceLoc) -> Result<()> {
+    let mut triangulation = Triangulation::default();
+    // One entry a triangle, for faces of several.
+    let mut others = Vec::new();
+    for face in faces {
+        let corner = |index: i64| {
+            let fits = usize::try_from(index).is_ok_and(|index| index < mesh.positions.len());
+            let what = || loc.invalid(format!("a face names vertex {index} of {}", mesh.positions.len()));
+            if fits { Ok(index as u32) } else { Err(what()) }
+        };
+        let corners = face.corners.iter().copied().map(corner).collect::<Result<Vec<_>>>()?;
+        triangulation.add(&corners, &mesh.positions, &mut mesh.triangles);
+        others.resize(mesh.triangles.len(), &*face.others);
+    }
+    mesh.attributes.extend(attributes("face_", &columns(element, &[]), others.into_iter()));
+    Ok(())
 }
 
 #[cfg(test)]

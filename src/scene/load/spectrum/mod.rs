@@ -51,7 +51,23 @@ impl Spectrum {
         Self::curve(curve, loc)
     }
 
-    fn curve(curve: Vec<[f64; 2]>, loc: &SourceLoc) -> Result<Self> {
+    /// Radiance of a black body at a temperature in kelvin (Planck's law), in W/(m² sr nm), times `scale`.
+    pub fn blackbody(kelvin: f64, scale: f64, loc: &SourceLoc) -> Result<Self> {
+        /// The two constants of Planck's law, for wavelengths in metres.
+        const RADIATION: [f64; 2] = [1.191_042_972e-16, 1.438_776_877e-2];
+        if kelvin <= 0.0 {
+            return Err(loc.invalid(format!("a black body of {kelvin} K; its temperature must be positive")));
+        }
+        let planck = |nanometres: f64| {
+            let wavelength = 1e-9 * nanometres;
+            1e-9 * RADIATION[0] / (wavelength.powi(5) * (RADIATION[1] / (wavelength * kelvin)).exp_m1())
+        };
+        let wavelengths = (0..cie::TABLE.len()).map(|row| cie::FIRST + cie::STEP * row as f64);
+        Ok(Self::Curve(wavelengths.map(|wavelength| [wavelength, scale * planck(wavelength)]).collect()))
+    }
+
+    /// From wavelengths and values.
+    pub fn curve(curve: Vec<[f64; 2]>, loc: &SourceLoc) -> Result<Self> {
         if curve.as_flattened().iter().any(|value| !value.is_finite()) {
             return Err(loc.invalid("a spectrum holds a number that is not finite"));
         }

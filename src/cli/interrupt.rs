@@ -1,0 +1,44 @@
+//! Signals that ask a long command to stop.
+
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicI32, Ordering};
+
+use anyhow::Result;
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+use signal_hook::iterator::Signals;
+
+use super::terminal::note;
+
+/// The first signal that came; 0 for none.
+static SIGNAL: AtomicI32 = AtomicI32::new(0);
+
+/// Exit codes of programs that a signal ended, less the signal's number.
+const SIGNALLED: i32 = 128;
+
+/// A flag that the first signal sets. A second Ctrl-C ends the program; a second request to terminate does not, since
+/// schedulers send several.
+pub fn stop_on_signal() -> Result<Arc<AtomicBool>> {
+    let stop = Arc::new(AtomicBool::new(false));
+    let flag = Arc::clone(&stop);
+    let mut signals = Signals::new([SIGINT, SIGTERM, SIGHUP])?;
+    std::thread::Builder::new().name("signals".into()).spawn(move || {
+        for signal in signals.forever() {
+            if flag.swap(true, Ordering::Relaxed) {
+                if signal == SIGINT {
+                    std::process::exit(SIGNALLED + SIGINT);
+                }
+                continue;
+            }
+            SIGNAL.store(signal, Ordering::Relaxed);
+            note!("\nstopping after the running tiles; once more Ctrl-C ends at once");
+        }
+    })?;
+    Ok(stop)
+}
+
+/// The exit code of a command that was stopped by a signal.
+pub fn stopped() -> Option<ExitCode> {
+    let signal = SIGNAL.load(Ordering::Relaxed);
+    (signal != 0).then(|| ExitCode::from((SIGNALLED + signal) as u8))
+}

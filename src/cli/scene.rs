@@ -1,0 +1,67 @@
+//! Common part of the commands that read scene files: options that override what is in them.
+
+use std::path::Path;
+
+use fluxion::error::Result;
+use fluxion::scene::sensor::Crop;
+use fluxion::scene::{Scene, load};
+
+use super::terminal::note;
+
+/// Options of a scene file.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Value of a scene parameter, over its <default>
+    #[arg(short = 'D', value_parser = super::parse_definition, value_name = "NAME=VALUE")]
+    pub define: Vec<(String, String)>,
+    /// Sensor to look through, by its id or its number from 0 [default: the first]
+    #[arg(long, value_name = "N|ID")]
+    pub sensor: Option<String>,
+    /// Film size in place of the scene's, as in 640x360
+    #[arg(long, value_parser = super::parse_size, value_name = "WxH")]
+    pub size: Option<(usize, usize)>,
+    /// Part of the film to render, as its first column and row and its size: 100,50,320x180
+    #[arg(long, value_parser = parse_crop, value_name = "X,Y,WxH")]
+    pub crop: Option<Crop>,
+    /// Take every warning of the scene file's reader for an error
+    #[arg(long)]
+    strict: bool,
+}
+
+impl Args {
+    /// The options of the loader that they are.
+    pub fn options(&self) -> load::Options {
+        load::Options {
+            parameters: self.define.clone(),
+            sensor: self.sensor.clone(),
+            size: self.size,
+            crop: self.crop,
+            strict: self.strict,
+            ..load::Options::default()
+        }
+    }
+
+    /// The same as command line options, for messages.
+    pub fn as_text(&self) -> String {
+        let definitions = self.define.iter().map(|(name, value)| format!(" -D '{name}={value}'"));
+        let sensor = self.sensor.iter().map(|sensor| format!(" --sensor {sensor}"));
+        let size = self.size.iter().map(|(width, height)| format!(" --size {width}x{height}"));
+        let crop = self.crop.iter().map(|crop| format!(" --crop {crop}"));
+        definitions.chain(sensor).chain(size).chain(crop).collect()
+    }
+}
+
+/// Loads a scene and prints the loader's warnings.
+pub fn load(path: &Path, options: &load::Options) -> Result<Scene> {
+    let scene = load::load(path, options)?;
+    scene.warnings().iter().for_each(|warning| note!("warning: {warning}"));
+    Ok(scene)
+}
+
+fn parse_crop(text: &str) -> Result<Crop, String> {
+    let error = || "a part of the film is written X,Y,WIDTHxHEIGHT, as in 100,50,320x180".to_owned();
+    let [x, y, size] = text.splitn(3, ',').collect::<Vec<_>>()[..] else { return Err(error()) };
+    let (width, height) = super::parse_size(size.trim())?;
+    let number = |text: &str| text.trim().parse().map_err(|_| error());
+    Ok(Crop { x: number(x)?, y: number(y)?, width, height })
+}

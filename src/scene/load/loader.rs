@@ -1,0 +1,263 @@
+//! Builds objects of scene files, each shared one once.
+
+use std::cell::RefCell;
+use std::collections::{BTreeSet, HashMap};
+use std::path::{Path, PathBuf};
+use std::rc::Rc;
+use std::sync::Arc;
+
+use super::mesh::{self, MeshData};
+use super::props::{Object, Property, Value};
+use super::{find, xml};
+use crate::error::{Error, Result, SourceLoc};
+use crate::math::Rgb;
+use crate::scene::bsdf::{self, Bsdf};
+use crate::scene::shape::Geometry;
+use crate::scene::texture::{self, Texture};
+
+/// Nesting deeper than this (a BSDF in a BSDF in ...) is taken for a loop of references.
+const MAX_NESTING: usize = 32;
+/// Materials and textures built from more objects than this are taken for a mistake.
+const MAX_COST: usize = 1000;
+
+/// Builds objects, each shared one once.
+pub struct Loader {
+    tree: xml::Tree,
+    /// Objects that have been built, with the number of objects that each is made of.
+    bsdfs: HashMap<*const Object, (Arc<dyn Bsdf>, usize)>,
+    textures: HashMap<*const Object, (Arc<dyn Texture>, usize)>,
+    bitmaps: HashMap<(PathBuf, texture::Selection), Arc<texture::Texels>>,
+    texture_memory: texture::Memory,
+    meshes: HashMap<PathBuf, Vec<u8>>,
+    /// Every file that a property names.
+    files: RefCell<BTreeSet<PathBuf>>,
+    nesting: usize,
+    /// Objects that the current one is nested in.
+    cost: usize,
+    /// Textures that need to know all shapes.
+    pub attributes: Vec<texture::Unbound>,
+}
+
+impl Loader {
+    /// A loader of the objects of a file, with so many bytes of memory for textures.
+    pub fn new(tree: xml::Tree, texture_memory: u64) -> Self {
+        Self {
+            tree,
+            bsdfs: HashMap::new(),
+            textures: HashMap::new(),
+            bitmaps: HashMap::new(),
+            texture_memory: texture::Memory::new(texture_memory),
+            meshes: HashMap::new(),
+            files: RefCell::default(),
+            nesting: 0,
+            cost: 0,
+            attributes: Vec::new(),
+        }
+    }
+
+    /// Textures that wait for all shapes, the files that were read, and the warnings.
+    pub fn finish(self) -> (Vec<texture::Unbound>, Vec<PathBuf>, Vec<String>) {
+        (self.attributes, self.files.into_inner().into_iter().collect(), self.tree.warnings.into_list())
+    }
+
+    /// Warns that something does not mean what it says; fails where warnings are errors.
+    pub fn warn(&self, loc: &SourceLoc, what: impl Into<String>) -> Result<()> {
+        self.tree.warnings.add(loc, what)
+    }
+
+    /// Warns of every property of an object that was never read and might change the image.
+    pub fn warn_unused(&self, object: &Object) -> Result<()> {
+        object.unused().try_for_each(|property| {
+            let (class, plugin) = (&object.class, &object.plugin);
+            let name = match &property.value {
+                Value::Object(nested) => format!("the nested {} `{}`", nested.class, nested.plugin),
+                _ => format!("`{}`", property.name),
+            };
+            self.warn(&property.loc, format!("{name} of {class} `{plugin}` has no meaning here and is ignored"))
+        })
+    }
+
+    /// The object a property holds or refers to.
+    pub fn resolve(&self, property: &Property) -> Result<Rc<Object>> {
+        match &property.value {
+            Value::Object(object) => Ok(Rc::clone(object)),
+            Value::Reference(id) => {
+                let found = self.tree.ids.get(id).cloned();
+                found.ok_or_else(|| property.loc.invalid(format!("nothing has the id `{id}`")))
+            }
+            _ => Err(property.loc.invalid(format!("`{}` must be a nested object", property.name))),
+        }
+    }
+
+    /// Builds something nested, unless it is nested in itself.
+    pub fn guarded<T>(&mut self, object: &Object, make: impl FnOnce(&mut Self) -> Result<T>) -> Result<T> {
+        if self.nesting >= MAX_NESTING {
+            return Err(object.loc.invalid("nested too deeply: does it refer to itself?"));
+        }
+        self.nesting += 1;
+        let made = make(self);
+        self.nesting -= 1;
+        made
+    }
+
+    /// Builds something with the number of objects that looking it up goes through: references can double it at every
+    /// level of nesting.
+    fn counted<T>(&mut self, object: &Object, make: impl FnOnce(&mut Self) -> Result<T>) -> Result<(T, usize)> {
+        let outer = std::mem::take(&mut self.cost);
+        let made = self.guarded(object, make)?;
+        let cost = self.cost + 1;
+        if cost > MAX_COST {
+            return Err(object.loc.invalid(format!("built from more than {MAX_COST} other objects")));
+        }
+        self.cost = outer + cost;
+        Ok((made, cost))
+    }
+
+    /// Builds a BSDF, or gives the one already built from this object.
+    pub fn bsdf(&mut self, object: &Rc<Object>) -> Result<Arc<dyn Bsdf>> {
+        if let Some((bsdf, cost)) = self.bsdfs.get(&Rc::as_ptr(object)) {
+            self.cost += cost;
+            return Ok(Arc::clone(bsdf));
+        }
+        let plugin = find(bsdf::PLUGINS, object)?;
+        // Reflectances above one are the file's to avoid.
+        object.ignore(&["ensure_energy_conservation"]);
+        let (made, cost) = self.counted(object, |loader| (plugin.make)(object, loader))?;
+        object.all_used(plugin.parameters)?;
+        self.bsdfs.insert(Rc::as_ptr(object), (Arc::clone(&made), cost));
+        Ok(made)
+    }
+
+    /// The BSDFs nested in an object.
+    pub fn nested_bsdfs(&mut self, object: &Object) -> Result<Vec<Arc<dyn Bsdf>>> {
+        let mut found = Vec::new();
+        for property in object.nested() {
+            let nested = self.resolve(property)?;
+            if nested.class == "bsdf" {
+                property.take();
+                found.push(self.bsdf(&nested)?);
+            }
+        }
+        Ok(found)
+    }
+
+    /// The one BSDF nested in an object.
+    pub fn nested_bsdf(&mut self, object: &Object) -> Result<Arc<dyn Bsdf>> {
+        let mut found = self.nested_bsdfs(object)?;
+        match (found.pop(), found.is_empty()) {
+            (Some(bsdf), true) => Ok(bsdf),
+            _ => Err(object.loc.invalid(format!("bsdf `{}` needs exactly one nested bsdf", object.plugin))),
+        }
+    }
+
+    /// The one texture nested in an object, whatever its name.
+    pub fn nested_texture(&mut self, object: &Object) -> Result<Arc<dyn Texture>> {
+        let mut found = None;
+        for property in object.nested() {
+            let nested = self.resolve(property)?;
+            if nested.class == "texture" && found.is_none() {
+                property.take();
+                found = Some(self.texture_object(&nested)?);
+            }
+        }
+        found.ok_or_else(|| object.loc.invalid(format!("`{}` needs a nested texture", object.plugin)))
+    }
+
+    /// The property `name` as a texture: a colour, a number, or a nested texture.
+    pub fn texture(&mut self, object: &Object, name: &str, default: Rgb) -> Result<Arc<dyn Texture>> {
+        match object.get(name) {
+            Some(property) if matches!(property.value, Value::Object(_) | Value::Reference(_)) => {
+                let nested = self.resolve(property)?;
+                self.texture_object(&nested)
+            }
+            _ => Ok(Arc::new(texture::Constant(object.color(name, default)?))),
+        }
+    }
+
+    /// The property `name` as emitted light, white when absent.
+    pub fn radiance(&mut self, object: &Object, name: &str) -> Result<Arc<dyn Texture>> {
+        match object.get(name) {
+            Some(property @ Property { value: Value::Object(_) | Value::Reference(_), .. }) => {
+                let nested = self.resolve(property)?;
+                match texture::spectra::curve(&nested)? {
+                    Some(spectrum) => Ok(Arc::new(texture::Constant(spectrum.emission()))),
+                    None => self.texture_object(&nested),
+                }
+            }
+            _ => Ok(Arc::new(texture::Constant(object.emission(name, Rgb::ONE)?))),
+        }
+    }
+
+    /// The same where it has to be a single colour.
+    pub fn uniform_radiance(&mut self, object: &Object, name: &str) -> Result<Rgb> {
+        let radiance = self.radiance(object, name)?;
+        let what = format!("a texture as the `{name}` of `{}`; it is one colour", object.plugin);
+        radiance.constant().ok_or_else(|| object.loc_of(name).unsupported(what))
+    }
+
+    /// Builds a texture, or gives the one already built from this object.
+    pub fn texture_object(&mut self, object: &Rc<Object>) -> Result<Arc<dyn Texture>> {
+        if let Some((texture, cost)) = self.textures.get(&Rc::as_ptr(object)) {
+            self.cost += cost;
+            return Ok(Arc::clone(texture));
+        }
+        if object.class != "texture" {
+            return Err(object.loc.invalid(format!("a texture is needed here, not <{}>", object.class)));
+        }
+        let plugin = find(texture::PLUGINS, object)?;
+        let (made, cost) = self.counted(object, |loader| (plugin.make)(object, loader))?;
+        object.all_used(plugin.parameters)?;
+        self.textures.insert(Rc::as_ptr(object), (Arc::clone(&made), cost));
+        Ok(made)
+    }
+
+    /// The file that the property `filename` names, looked for in the scene's folders.
+    pub fn file(&self, object: &Object) -> Result<PathBuf> {
+        let name = object.string("filename", "")?;
+        if name.is_empty() {
+            return Err(object.loc.invalid(format!("{} `{}` needs a `filename`", object.class, object.plugin)));
+        }
+        let folders = &self.tree.folders;
+        let found = folders.find_file(&name);
+        let found = found.ok_or_else(|| object.loc_of("filename").invalid(folders.missing(&name)))?;
+        self.files.borrow_mut().insert(found.clone());
+        Ok(found)
+    }
+
+    /// The texels of the image file that an object names, each selection read once.
+    pub fn texels(&mut self, object: &Object, selection: texture::Selection) -> Result<Arc<texture::Texels>> {
+        let key = (self.file(object)?, selection);
+        if let Some(texels) = self.bitmaps.get(&key) {
+            return Ok(Arc::clone(texels));
+        }
+        let (texels, infinite) = texture::Texels::read(&key.0, &key.1, &mut self.texture_memory)?;
+        if infinite > 0 {
+            let what = format!("{infinite} texels are not finite: infinity counts as 65504, what is no number as zero");
+            self.warn(&SourceLoc::file(&key.0), what)?;
+        }
+        let texels = Arc::new(texels);
+        self.bitmaps.insert(key, Arc::clone(&texels));
+        Ok(texels)
+    }
+
+    /// The mesh of a shape object whose type is a format of meshes.
+    pub fn mesh(&mut self, object: &Object) -> Result<MeshData> {
+        let path = self.file(object)?;
+        let bytes = |path: &Path| std::fs::read(path).map_err(|error| Error::io(path, error));
+        if object.plugin != "serialized" {
+            return mesh::read(&object.plugin, &bytes(&path)?, 0, &path);
+        }
+        let index = usize::try_from(object.integer("shape_index", 0)?)
+            .map_err(|_| object.loc_of("shape_index").invalid("`shape_index` cannot be negative"))?;
+        // One such file holds many meshes.
+        if !self.meshes.contains_key(&path) {
+            self.meshes.insert(path.clone(), bytes(&path)?);
+        }
+        mesh::read(&object.plugin, &self.meshes[&path], index, &path)
+    }
+
+    /// A geometry whose transform or numbers leave the range of floats cannot be traced.
+    pub fn finite(&self, object: &Object, geometry: Geometry) -> Result<Geometry> {
+        if geometry.bounds().is_finite() { Ok(geometry) } else { Err(object.loc.invalid("coordinates are not finite")) }
+    }
+}
