@@ -15,11 +15,14 @@ use super::stats::Stats;
 /// Options of `reconstruct`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// EXR file written by `fluxion render --layers`, or a checkpoint
+    /// EXR file written by `fluxion render --layers`, or by Mitsuba, Cycles or pbrt with auxiliary channels; or a checkpoint
     layers: PathBuf,
     /// Image to write, by its extension: exr, hdr, pfm, tiff, png or jpg; may be given several times
     #[arg(short, long, required = true, value_name = "FILE")]
     output: Vec<PathBuf>,
+    /// Samples per pixel of a file that does not say
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
+    spp: Option<u32>,
     #[command(flatten)]
     method: method::Args,
     /// Threads to work with (0: one per core)
@@ -42,7 +45,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let mut frame = if checkpoint::is_one(&args.layers) {
         checkpoint::load(&args.layers)?.develop()
     } else {
-        exr::load(&args.layers)?
+        exr::load_counted(&args.layers, args.spp)?
     };
     let _claims = Claims::new(&args.output, &[&args.json], &[&args.layers])?;
     stats.seconds.load = start.elapsed().as_secs_f64();

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{Frame, Layer, Provenance};
+use super::{Frame, Layer, Provenance, aovs};
 use crate::error::{Error, Result};
 use crate::image::Image;
 use crate::image::io::{Kind, Pixels, read, write};
@@ -29,6 +29,12 @@ pub fn save(path: &Path, frame: &Frame) -> Result<()> {
 
 /// Reads the layers that a file has. Channels that belong to no layer are ignored.
 pub fn load(path: &Path) -> Result<Frame> {
+    load_counted(path, None)
+}
+
+/// The same of a file that may be another program's: its channels are layers as far as their names are known, and its
+/// pixels have `spp` samples where it does not say how many.
+pub fn load_counted(path: &Path, spp: Option<u32>) -> Result<Frame> {
     let pixels = read(path, &Provenance::NAMES)?;
     let mut frame = Frame::new(pixels.width, pixels.height);
     for layer in Layer::all() {
@@ -39,10 +45,13 @@ pub fn load(path: &Path) -> Result<Frame> {
         let image = Image { width: pixels.width, height: pixels.height, channels: positions.len(), data };
         frame.set(layer, image);
     }
+    frame.provenance = Provenance::from_attributes(&pixels.attributes);
+    if frame.provenance.version.is_empty() {
+        aovs::complete(&mut frame, &pixels, spp);
+    }
     if frame.get(Layer::Color).is_none() {
         return Err(Error::io(path, format!("no channels R, G, B among {}", pixels.channels.join(", "))));
     }
     frame.window = pixels.window;
-    frame.provenance = Provenance::from_attributes(&pixels.attributes);
     Ok(frame)
 }

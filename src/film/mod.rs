@@ -5,6 +5,7 @@
 //! Sample --add--> Tile (table of statistics) --develop--> Frame (table of layers) --edges--> Edges
 //! ```
 
+mod aovs;
 mod develop;
 mod edges;
 pub mod exr;

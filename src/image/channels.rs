@@ -47,6 +47,9 @@ const FROM_XYZ: [Rgb; 3] = [
     vec3(0.055_648, -0.204_043, 1.057_311),
 ];
 
+/// Names of the layer that is the picture.
+const BEAUTY: &[&str] = &["combined", "beauty", "rgba"];
+
 /// Names of a single channel of luminance.
 const GREY: &[&str] = &["y", "l", "i", "grey", "gray", "luminance"];
 
@@ -128,7 +131,11 @@ fn choose(channels: &[String]) -> Option<([usize; 3], bool)> {
         (Some(found), ..) => Some(found),
         (None, 1, _) => Some(([0; 3], false)),
         (None, _, [layer]) if parts.iter().all(|(other, _)| other == layer) => of_layer(layer),
-        _ => None,
+        // Of several layers the picture itself, as Blender and compositors name it.
+        (None, _, layers) => BEAUTY.iter().find_map(|name| {
+            let mut named = layers.iter().filter(|layer| layer.rsplit('.').next() == Some(name));
+            named.find_map(|layer| of_layer(layer))
+        }),
     }
 }
 
@@ -178,6 +185,7 @@ mod tests {
             ("A", Some(([0; 3], false))),
             ("Y RY BY", None),
             ("a.R a.G a.B b.R b.G b.B", None),
+            ("V.Depth.Z V.Combined.R V.Combined.G V.Combined.B V.Combined.A", Some(([1, 2, 3], false))),
         ] {
             assert_eq!(choose(&names(channels)), expected, "{channels}");
         }
