@@ -2,7 +2,7 @@
 # Fills the corpora from the bundled scenes, small mesh files first.
 set -eu
 cd "$(dirname "$0")"
-mkdir -p corpus/scene corpus/mesh corpus/layers corpus/checkpoint
+mkdir -p corpus/scene corpus/mesh corpus/layers corpus/texture corpus/checkpoint
 for scene in ../scenes/*/scene.xml ../scenes/unit/*/scene.xml; do
 	name=$(basename "$(dirname "$scene")")
 	sed 's|\.\./\.\./assets|/nowhere|; s|\.\./assets|/nowhere|' "$scene" > "corpus/scene/$name.xml"
@@ -13,6 +13,12 @@ printf 'ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty floa
 put '\001' torus.ply < ../scenes/assets/torus_binary.ply
 put '\001' colors.ply < ../scenes/assets/torus_colors.ply
 put '\002' torus.serialized < ../scenes/assets/torus.serialized
+printf 'v 0 0 0 # a\nv 2 0 \\\n0\nv 0.5 0.5 0\nv 0 2 0\nf 1 2 3 4\n' | put '\000' concave.obj
+printf 'ply\nformat ascii 1.0\nelement face 1\nproperty list uchar int vertex_index\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\nend_header\n4 0 1 2 3\n0 0 0\n2 0 0\n0.5 0.5 0\n0 2 0\n' | put '\001' faces-first.ply
+cp ../tests/data/scenes/*.xml corpus/scene/
+for image in sky.exr:000 bumps.png:001 holes.png:005; do
+	{ printf "\\${image#*:}"; cat "../scenes/assets/${image%:*}"; } > "corpus/texture/${image%:*}"
+done
 # Small ones, which the program makes itself. The target adds the checksum.
 fluxion=../target/release/fluxion
 for method in primal l2 frgr apr; do

@@ -77,6 +77,8 @@ unbiased! {
     unbiased_on_instances: "unit/instances", 64, Shift::default();
     unbiased_on_principled_materials: "unit/principled", 64, Shift::default();
     unbiased_on_bent_and_blended_materials: "unit/normal-map", 64, Shift::default();
+    unbiased_on_layered_materials: "unit/layered", 64, Shift::default();
+    unbiased_under_sun_and_sky: "unit/sun-and-sky", 64, Shift::default();
     unbiased_by_replay: "unit/occluder", 64, Shift::named("replay").unwrap();
     unbiased_by_replay_through_glass: "unit/dielectric", 64, Shift::named("replay").unwrap();
 }

@@ -21,3 +21,4 @@ mod oidn;
 mod report;
 mod stress;
 mod vocabulary;
+mod wild;

@@ -17,8 +17,9 @@ impl Parser {
         let name = self.optional(at, "name")?.unwrap_or_default();
         let name = if self.legacy { legacy::snake_case(&name) } else { name };
         let value = self.value(at)?;
-        let is_object = matches!(value, Value::Object(_) | Value::Reference(_));
-        if let (false, Some(id)) = (is_object, self.optional(at, "id")?) {
+        // Objects see to their own, and those of references are others'.
+        let is_value = !matches!(value, Value::Object(_)) && at.tag() != "ref";
+        if let (true, Some(id)) = (is_value, self.optional(at, "id")?) {
             if self.tree.ids.contains_key(&id) || self.values.insert(id.clone(), value.clone()).is_some() {
                 return Err(at.loc().invalid(format!("the id `{id}` is given twice")));
             }

@@ -1,0 +1,467 @@
+//! Scene files as they are found: of older versions, of other programs, in odd encodings. Each kind has a small file here
+//! with the value that is right for it.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use crate::common::{film, sensor};
+use fluxion::Result;
+use fluxion::film::{Film, Layer, Needs};
+use fluxion::scene::{Scene, load};
+
+/// A scene of some files, of which `scene.xml` is the first to be read.
+fn scene_of(files: &[(&str, &[u8])], options: &load::Options) -> Result<Scene> {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, bytes) in files {
+        let path = folder.path().join(name);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(path, bytes).unwrap();
+    }
+    load::load(&folder.path().join("scene.xml"), options)
+}
+
+fn try_text(text: &str) -> Result<Scene> {
+    scene_of(&[("scene.xml", text.as_bytes())], &load::Options::default())
+}
+
+fn text(text: &str) -> Scene {
+    try_text(text).unwrap_or_else(|error| panic!("{error}\n{text}"))
+}
+
+/// A scene file of a version, with a camera.
+fn file(version: &str, body: &str) -> String {
+    format!("<scene version=\"{version}\">{}{body}</scene>", sensor("0,0,5", 16, 16))
+}
+
+/// Scattered light and what the camera sees directly, of every pixel.
+fn pixels(film: &Film) -> Vec<[f32; 3]> {
+    let frame = film.develop();
+    let (color, direct) = (frame.get(Layer::Color).unwrap(), frame.get(Layer::Direct).unwrap());
+    let pixel = |i: usize| [0, 1, 2].map(|c: usize| color.data[3 * i + c] + direct.data[3 * i + c]);
+    (0..color.width * color.height).map(pixel).collect()
+}
+
+/// The colour of the centre, and of the corner.
+fn centre_and_corner(scene: &Scene) -> ([f32; 3], [f32; 3]) {
+    let all = pixels(&film(scene, 16, 1, Needs::default()));
+    let middle = scene.sensor().height / 2 * scene.sensor().width + scene.sensor().width / 2;
+    (all[middle], all[0])
+}
+
+fn near(found: [f32; 3], expected: [f32; 3], what: &str) {
+    let apart = found.iter().zip(expected).all(|(a, b)| (a - b).abs() <= 0.03 * (0.02 + b.abs()));
+    assert!(apart, "{what}: {found:?} instead of {expected:?}");
+}
+
+const BALL: &str = "<shape type=\"sphere\"/><emitter type=\"constant\"/>";
+
+#[test]
+fn any_encoding_and_what_pugixml_forgives_is_read() {
+    let plain = file("3.0.0", BALL);
+    let utf16: Vec<u8> = format!("\u{feff}{plain}").encode_utf16().flat_map(u16::to_le_bytes).collect();
+    let latin1 = [b"<?xml version=\"1.0\" encoding=\"iso-8859-1\"?><!-- K\xe4se -->", plain.as_bytes()].concat();
+    let blank = format!("\n\n<?xml version=\"1.0\"?>\n{plain}\nthe end");
+    let odd = file("3.0.0", &format!("<!-- -- a -- b ---->{}", BALL.replace("sphere\"", "sphere\" id=\"a & b\"")));
+    for bytes in [plain.as_bytes(), &utf16, &latin1, blank.as_bytes(), odd.as_bytes()] {
+        let scene = scene_of(&[("scene.xml", bytes)], &load::Options::default()).unwrap();
+        near(centre_and_corner(&scene).0, [0.5; 3], "the ball");
+    }
+}
+
+#[test]
+fn objects_are_referred_to_from_anywhere() {
+    let scene = text(
+        "<scene version=\"3.0.0\"><integer id=\"few\" name=\"n\" value=\"7\"/>
+        <rgb id=\"paint\" name=\"c\" value=\"0.25\"/><integer id=\"side\" name=\"s\" value=\"16\"/>
+        <sampler type=\"independent\" id=\"s\"><ref name=\"sample_count\" id=\"few\"/></sampler>
+        <film type=\"hdrfilm\" id=\"f\"><ref name=\"width\" id=\"side\"/><integer name=\"height\" value=\"16\"/></film>
+        <sensor type=\"perspective\"><transform name=\"to_world\"><lookat origin=\"0,0,5\" target=\"0,0,0\" up=\"0,1,0\"/>
+        </transform><ref id=\"s\"/><ref id=\"f\"/></sensor>
+        <emitter type=\"area\" id=\"lamp\"><rgb name=\"radiance\" value=\"3 2 1\"/></emitter>
+        <shape type=\"sphere\"><ref id=\"lamp\"/><bsdf type=\"diffuse\"><ref name=\"reflectance\" id=\"paint\"/></bsdf></shape>
+        <emitter type=\"constant\"/></scene>",
+    );
+    assert_eq!((scene.sensor().width, scene.sensor().spp), (16, 7));
+    near(centre_and_corner(&scene).0, [3.25, 2.25, 1.25], "the lamp");
+}
+
+#[test]
+fn included_files_may_hold_one_object() {
+    let part = "<bsdf type=\"diffuse\" version=\"0.6.0\"><spectrum name=\"diffuseReflectance\" value=\"0.25\"/></bsdf>";
+    let ball = "<shape type=\"sphere\" version=\"3.0.0\"><include filename=\"part.xml\"/></shape>";
+    let main = file("3.0.0", "<include filename=\"ball.xml\"/><emitter type=\"constant\"/>");
+    let files =
+        [("part.xml", part), ("ball.xml", ball), ("scene.xml", &main)].map(|(name, text)| (name, text.as_bytes()));
+    let scene = scene_of(&files, &load::Options::default()).unwrap();
+    near(centre_and_corner(&scene).0, [0.25; 3], "the ball");
+    let message = scene_of(&[("scene.xml", ball.as_bytes())], &load::Options::default()).err().unwrap().to_string();
+    assert!(message.contains("starts with <scene>, not <shape>"), "{message}");
+}
+
+#[test]
+fn folders_of_paths_come_before_the_scenes_own_the_last_one_first() {
+    let obj = |z: i32| format!("v -9 -9 {z}\nv 9 -9 {z}\nv 0 9 {z}\nf 1 2 3\n");
+    let (own, first, second) = (obj(0), obj(1), obj(2));
+    for (paths, depth) in [("", 5.0), ("<path value=\"a\"/>", 4.0), ("<path value=\"a\"/><path value=\"b\"/>", 3.0)] {
+        let main =
+            file("3.0.0", &format!("{paths}<shape type=\"obj\"><string name=\"filename\" value=\"m.obj\"/></shape>"));
+        let files = [("m.obj", &own), ("a/m.obj", &first), ("b/m.obj", &second), ("scene.xml", &main)];
+        let scene = scene_of(&files.map(|(name, text)| (name, text.as_bytes())), &load::Options::default()).unwrap();
+        let frame = film(&scene, 1, 1, Needs { features: true, ..Needs::default() }).develop();
+        let found = frame.get(Layer::Depth).unwrap().rgb(8, 8).x;
+        assert!((found - depth).abs() < 0.05, "{paths}: {found}");
+    }
+}
+
+#[test]
+fn lamps_without_a_material_are_black() {
+    let inside = "<scene version=\"3.0.0\"><sensor type=\"perspective\"><film type=\"hdrfilm\"><integer name=\"width\" \
+        value=\"4\"/><integer name=\"height\" value=\"4\"/></film></sensor><shape type=\"SHAPE\"><boolean name=\"flip_normals\" \
+        value=\"true\"/><emitter type=\"area\"><rgb name=\"radiance\" value=\"1\"/></emitter>MATERIAL</shape></scene>";
+    for shape in ["sphere", "cube"] {
+        let of = |material: &str| text(&inside.replace("SHAPE", shape).replace("MATERIAL", material));
+        near(centre_and_corner(&of("")).0, [1.0; 3], shape);
+        let grey = film(&of("<bsdf type=\"diffuse\"/>"), 64, 1, Needs::default());
+        let mean = pixels(&grey).iter().map(|pixel| pixel[0]).sum::<f32>() / 16.0;
+        assert!((mean - 2.0).abs() < 0.1, "{shape}: {mean}");
+    }
+}
+
+/// A parallel view of the square [-1, 1]².
+fn flat(body: &str) -> String {
+    format!(
+        "<scene version=\"3.0.0\"><sensor type=\"orthographic\"><transform name=\"to_world\"><lookat origin=\"0,0,5\" \
+        target=\"0,0,0\" up=\"0,1,0\"/></transform><film type=\"hdrfilm\"><integer name=\"width\" value=\"8\"/><integer \
+        name=\"height\" value=\"8\"/></film></sensor>{body}</scene>"
+    )
+}
+
+/// Mean of a view of a bright mesh.
+fn covered(name: &str, mesh: &[u8]) -> f32 {
+    let plugin = name.rsplit('.').next().unwrap();
+    let main = flat(&format!(
+        "<shape type=\"{plugin}\"><string name=\"filename\" value=\"{name}\"/><emitter type=\"area\"/></shape>"
+    ));
+    let scene = scene_of(&[(name, mesh), ("scene.xml", main.as_bytes())], &load::Options::default()).unwrap();
+    pixels(&film(&scene, 64, 1, Needs::default())).iter().map(|pixel| pixel[0]).sum::<f32>() / 64.0
+}
+
+#[test]
+fn meshes_of_any_order_and_outline_are_read_as_they_are() {
+    // A square less a notch of a quarter, whose first corner is opposite to it.
+    let outline = ["-1 -1 0", "1 -1 0", "1 1 0", "0 1 0", "0 0 0", "-1 0 0"];
+    let header = |elements: &str| format!("ply\nformat ascii 1.0\n{elements}end_header\n");
+    let (vertex, face) = (
+        "element vertex 6\nproperty float x\nproperty float y\nproperty float z\n",
+        "element face 1\nproperty list uchar int vertex_index\n",
+    );
+    for turn in 0..6 {
+        let order: Vec<_> = (0..6).map(|k| (k + turn) % 6).collect();
+        let corners = |first: usize| order.iter().map(|k| (k + first).to_string()).collect::<Vec<_>>().join(" ");
+        let obj: String =
+            outline.iter().map(|v| format!("v {v} # corner\n")).collect::<String>() + &format!("f {}\n", corners(1));
+        let obj = format!("\u{feff}{}", obj.replacen("f ", "f \\\n", 1));
+        let (points, list) = (outline.join("\n") + "\n", format!("6 {}\n", corners(0)));
+        let first = header(&format!("{face}{vertex}")) + &list + &points;
+        let last = header(&format!("{vertex}{face}")) + &points + &list;
+        for (name, mesh) in [("m.obj", &obj), ("m.ply", &first), ("m.ply", &last)] {
+            let mean = covered(name, mesh.as_bytes());
+            assert!((mean - 0.75).abs() < 0.01, "{name} from corner {turn}: {mean}");
+        }
+    }
+}
+
+#[test]
+fn balls_scaled_unevenly_are_meshes_that_look_the_same() {
+    let scale = "<transform name=\"to_world\"><scale x=\"0.8\" y=\"0.4\" z=\"0.6\"/></transform>";
+    let ball = text(&flat(&format!("<shape type=\"sphere\">{scale}<emitter type=\"area\"/></shape>")));
+    assert!(ball.warnings()[0].contains("scaled unevenly is traced as a mesh"), "{:?}", ball.warnings());
+    let mean = pixels(&film(&ball, 256, 1, Needs::default())).iter().map(|pixel| pixel[0]).sum::<f32>() / 64.0;
+    let ellipse = std::f32::consts::PI * 0.8 * 0.4 / 4.0;
+    assert!((mean - ellipse).abs() < 4e-3, "{mean} {ellipse}");
+    // A side that is turned outwards in, and a cylinder.
+    let inside = flat(&format!(
+        "<shape type=\"sphere\">{scale}<boolean name=\"flip_normals\" value=\"true\"/><emitter type=\"area\"/></shape>"
+    ));
+    assert!(pixels(&film(&text(&inside), 4, 1, Needs::default())).iter().all(|pixel| *pixel == [0.0; 3]));
+    let skewed = flat(
+        "<shape type=\"cylinder\"><transform name=\"to_world\"><matrix value=\"1 0 0  0 0.5 0  0 0 1\"/></transform><emitter \
+        type=\"area\"/></shape>",
+    );
+    assert_eq!(text(&skewed).warnings().len(), 1);
+}
+
+/// What older files say and how it is said today: the same image.
+#[test]
+fn files_of_version_0_6_show_what_their_translations_show() {
+    let material = |text: &str| format!("<shape type=\"sphere\">{text}</shape><emitter type=\"constant\"/>");
+    let rough = |text: &str| material(&format!("<bsdf type=\"roughconductor\">{text}</bsdf>"));
+    let diffuse = |text: &str| material(&format!("<bsdf type=\"diffuse\">{text}</bsdf>"));
+    let tiles = format!("<string name=\"filename\" value=\"{}\"/>", asset("tiles.png"));
+    let bitmap = |text: &str| format!("<texture type=\"bitmap\" name=\"reflectance\">{tiles}{text}</texture>");
+    let normals = format!("<string name=\"filename\" value=\"{}\"/>", asset("normals.png"));
+    let bumps = format!("<string name=\"filename\" value=\"{}\"/>", asset("bumps.png"));
+    let torus = format!("<string name=\"filename\" value=\"{}\"/>", asset("torus.obj"));
+    let integrator = |plugin: &str, depth: &str| {
+        format!("<integrator type=\"{plugin}\"><integer name=\"{depth}\" value=\"3\"/></integrator>{BALL}")
+    };
+    for (old, new) in [
+        (
+            diffuse("<rgb name=\"reflectance\" value=\"#808080\"/>"),
+            diffuse("<rgb name=\"reflectance\" value=\"0.2158605\"/>"),
+        ),
+        (
+            diffuse("<spectrum name=\"reflectance\" value=\"0.3, 0.2, 0.1\"/>"),
+            diffuse("<rgb name=\"reflectance\" value=\"0.3 0.2 0.1\"/>"),
+        ),
+        (
+            "<emitter type=\"constant\"><spectrum name=\"radiance\" value=\"2\"/></emitter>".into(),
+            "<emitter type=\"constant\"><rgb name=\"radiance\" value=\"2\"/></emitter>".into(),
+        ),
+        (
+            "<emitter type=\"constant\"><blackbody name=\"radiance\" temperature=\"5000K\" scale=\"2\"/></emitter>"
+                .into(),
+            "<emitter type=\"constant\"><spectrum type=\"blackbody\" name=\"radiance\"><float name=\"temperature\" \
+            value=\"5000\"/><float name=\"scale\" value=\"2\"/></spectrum></emitter>"
+                .into(),
+        ),
+        (
+            rough("<string name=\"material\" value=\"Au\"/><float name=\"extEta\" value=\"1\"/>"),
+            rough("<string name=\"material\" value=\"Au\"/>"),
+        ),
+        (rough(""), rough("<string name=\"material\" value=\"Cu\"/>")),
+        (
+            diffuse(&bitmap(
+                "<string name=\"filterType\" value=\"ewa\"/><float name=\"maxAnisotropy\" value=\"10\"/><boolean \
+                name=\"cache\" value=\"False\"/><string name=\"wrapModeU\" value=\"clamp\"/><string name=\"wrapModeV\" \
+                value=\"mirror\"/>",
+            )),
+            diffuse(&bitmap(
+                "<string name=\"wrap_mode_u\" value=\"clamp\"/><string name=\"wrap_mode_v\" value=\"mirror\"/>",
+            )),
+        ),
+        (
+            diffuse(&bitmap("<float name=\"gamma\" value=\"1\"/><string name=\"channel\" value=\"g\"/>")),
+            diffuse(&bitmap("<boolean name=\"raw\" value=\"true\"/><string name=\"channel\" value=\"g\"/>")),
+        ),
+        (
+            material(&format!(
+                "<bsdf type=\"normalmap\"><texture type=\"bitmap\">{normals}<float name=\"gamma\" value=\"1\"/></texture><bsdf \
+                type=\"diffuse\"/></bsdf>"
+            )),
+            material(&format!(
+                "<bsdf type=\"normalmap\"><texture type=\"bitmap\" name=\"normalmap\">{normals}<boolean name=\"raw\" \
+                value=\"true\"/></texture><bsdf type=\"diffuse\"/></bsdf>"
+            )),
+        ),
+        (
+            material(&format!(
+                "<bsdf type=\"bump\"><texture type=\"scale\"><float name=\"scale\" value=\"0.3\"/><texture \
+                type=\"bitmap\">{bumps}<float name=\"gamma\" value=\"1\"/></texture></texture><bsdf type=\"diffuse\"/></bsdf>"
+            )),
+            material(&format!(
+                "<bsdf type=\"bumpmap\"><texture type=\"bitmap\">{bumps}<boolean name=\"raw\" value=\"true\"/></texture><float \
+                name=\"scale\" value=\"0.3\"/><bsdf type=\"diffuse\"/></bsdf>"
+            )),
+        ),
+        (
+            format!(
+                "<shape type=\"obj\">{torus}<float name=\"maxSmoothAngle\" value=\"0\"/></shape><emitter type=\"constant\"/>"
+            ),
+            format!(
+                "<shape type=\"obj\">{torus}<boolean name=\"face_normals\" value=\"true\"/></shape><emitter type=\"constant\"/>"
+            ),
+        ),
+        (integrator("gpt", "maxDepth"), integrator("path", "max_depth")),
+        (integrator("photonmapper", "maxDepth"), integrator("path", "max_depth")),
+        (
+            format!(
+                "<integrator type=\"adaptive\">{}</integrator>{BALL}",
+                "<integrator type=\"path\"><integer name=\"maxDepth\" value=\"3\"/></integrator>"
+            ),
+            integrator("path", "max_depth"),
+        ),
+        (
+            format!(
+                "{BALL}<shape type=\"sphere\"><animation name=\"toWorld\"><transform time=\"0\"><translate x=\"1\"/></transform><transform time=\"1\"><translate x=\"9\"/></transform></animation></shape>"
+            ),
+            format!(
+                "{BALL}<shape type=\"sphere\"><transform name=\"to_world\"><translate x=\"1\"/></transform></shape>"
+            ),
+        ),
+        (
+            material("<bsdf type=\"roughdielectric\"><string name=\"distribution\" value=\"as\"/></bsdf>"),
+            material("<bsdf type=\"roughdielectric\"/>"),
+        ),
+    ] {
+        let [old_film, new_film] = [("0.6.0", &old), ("3.0.0", &new)].map(|(version, body)| {
+            film(&text(&file(version, body)), 4, 1, Needs { features: true, ..Needs::default() })
+        });
+        for (old_pixel, new_pixel) in pixels(&old_film).into_iter().zip(pixels(&new_film)) {
+            near(old_pixel, new_pixel, &old);
+        }
+    }
+}
+
+fn asset(name: &str) -> String {
+    crate::common::root().join("scenes/assets").join(name).display().to_string()
+}
+
+#[test]
+fn spectra_and_textures_are_the_same_elements() {
+    for element in ["spectrum", "texture"] {
+        let light = |inside: &str| {
+            let body =
+                format!("<emitter type=\"constant\"><{element} name=\"radiance\" {inside}</{element}></emitter>");
+            centre_and_corner(&text(&file("3.0.0", &body))).1
+        };
+        near(light("type=\"d65\"><float name=\"scale\" value=\"2\"/>"), [2.0; 3], "d65");
+        near(
+            light("type=\"d65\"><rgb name=\"color\" value=\"1 2 3\"/><float name=\"scale\" value=\"2\"/>"),
+            [2.0, 4.0, 6.0],
+            "tinted",
+        );
+        near(light("type=\"uniform\"><float name=\"value\" value=\"2\"/>"), [2.0; 3], "uniform");
+        near(light("type=\"srgb\"><rgb name=\"color\" value=\"1 2 3\"/>"), [1.0, 2.0, 3.0], "srgb");
+        near(
+            light(
+                "type=\"irregular\"><string name=\"wavelengths\" value=\"400, 500, 600, 700\"/><string name=\"values\" value=\"0, 8, 15.6, 18.4\"/>",
+            ),
+            [20.7108, 10.8546, 2.771_15],
+            "irregular",
+        );
+        near(
+            light(
+                "type=\"regular\"><float name=\"wavelength_min\" value=\"400\"/><float name=\"wavelength_max\" value=\"700\"/><string name=\"values\" value=\"0, 8, 15.6, 18.4\"/>",
+            ),
+            [20.7108, 10.8546, 2.771_15],
+            "regular",
+        );
+        near(
+            light("type=\"blackbody\"><float name=\"temperature\" value=\"5000\"/>"),
+            [15263.4, 12083.0, 9593.2],
+            "black body",
+        );
+    }
+}
+
+#[test]
+fn what_means_something_else_is_said_and_strictness_makes_it_an_error() {
+    for (body, expected) in [
+        (
+            "<integrator type=\"bdpt\"><integer name=\"max_depth\" value=\"4\"/></integrator>",
+            "`bdpt` is not known here: the scene is path traced with max_depth 4",
+        ),
+        (
+            "<integrator type=\"path\"><float name=\"clamp\" value=\"4\"/></integrator>",
+            "`clamp` of integrator `path` has no meaning",
+        ),
+        (
+            "<integrator type=\"path\"><boolean name=\"strict_normals\" value=\"true\"/></integrator>",
+            "`strict_normals` is ignored",
+        ),
+        (
+            "<bsdf type=\"mixturebsdf\" id=\"m\"><string name=\"weights\" value=\"1 1\"/><bsdf type=\"diffuse\"/><bsdf type=\"diffuse\"/></bsdf><shape type=\"sphere\"><ref id=\"m\"/></shape>",
+            "`weights` add up to 2",
+        ),
+        ("<emitter type=\"sunsky\"><vector name=\"sun_direction\" value=\"0,0,-1\"/></emitter>", "it is night"),
+    ] {
+        let all = file("3.0.0", body);
+        let scene = text(&all);
+        assert!(
+            scene.warnings().len() == 1 && scene.warnings()[0].contains(expected),
+            "{body}: {:?}",
+            scene.warnings()
+        );
+        let strict = load::Options { strict: true, ..load::Options::default() };
+        let message = scene_of(&[("scene.xml", all.as_bytes())], &strict).err().unwrap().to_string();
+        assert!(message.contains(expected), "{message}");
+    }
+    // What cannot change the radiance is no matter for words.
+    let quiet = "<integrator type=\"path\"><integer name=\"samples_per_pass\" value=\"8\"/><float name=\"timeout\" value=\"60\"/>
+        <integer name=\"block_size\" value=\"32\"/></integrator><shape type=\"sphere\"><float \
+        name=\"silhouette_sampling_weight\" value=\"0.5\"/></shape>";
+    assert_eq!(text(&file("3.0.0", quiet)).warnings(), &[] as &[String]);
+}
+
+#[test]
+fn any_sensor_can_be_chosen_and_none_is_needed_to_look_at_a_scene() {
+    let second = sensor("0,0,9", 8, 4).replace("<sensor ", "<sensor id=\"far\" ");
+    let all = file("3.0.0", &format!("{second}{BALL}"));
+    let choose = |sensor: Option<&str>| {
+        let options = load::Options { sensor: sensor.map(Into::into), ..load::Options::default() };
+        scene_of(&[("scene.xml", all.as_bytes())], &options)
+    };
+    for (sensor, width) in [(None, 16), (Some("0"), 16), (Some("1"), 8), (Some("far"), 8)] {
+        assert_eq!(choose(sensor).unwrap().sensor().width, width, "{sensor:?}");
+    }
+    let message = choose(Some("near")).err().unwrap().to_string();
+    assert!(message.contains("has no sensor `near`; there are 0, 1 (`far`)"), "{message}");
+    assert_ne!(choose(None).unwrap().fingerprint(), choose(Some("far")).unwrap().fingerprint());
+    let bare = format!("<scene version=\"3.0.0\">{BALL}</scene>");
+    assert!(try_text(&bare).is_err());
+    let options = load::Options { sensor_optional: true, ..load::Options::default() };
+    assert_eq!(scene_of(&[("scene.xml", bare.as_bytes())], &options).unwrap().sensors().len(), 0);
+}
+
+/// Examples that are kept outside of the repository, if they are there.
+fn examples() -> Option<PathBuf> {
+    Some(crate::common::root().join("../shared/wild")).filter(|folder| folder.is_dir())
+}
+
+#[test]
+fn shared_examples_have_their_values() {
+    let Some(folder) = examples() else { return };
+    let load = |name: &str, define: &[(&str, &str)]| -> Scene {
+        let parameters = define.iter().map(|(name, value)| ((*name).into(), (*value).into())).collect();
+        let options = load::Options { parameters, ..load::Options::default() };
+        load::load(&folder.join(name), &options).unwrap_or_else(|error| panic!("{error}"))
+    };
+    let everywhere = |name: &str, define: &[(&str, &str)], expected: [f32; 3]| {
+        pixels(&film(&load(name, define), 16, 1, Needs::default()))
+            .into_iter()
+            .for_each(|pixel| near(pixel, expected, name));
+    };
+    everywhere("exr-channels/scene.xml", &[("image", "uint.exr")], [3.0; 3]);
+    everywhere("exr-channels/scene.xml", &[("image", "dot-rgb.exr")], [0.25, 0.5, 0.75]);
+    everywhere("lamp-without-bsdf/scene.xml", &[], [1.0; 3]);
+    everywhere("obj-lines/scene.xml", &[], [1.0; 3]);
+    everywhere("obj-lines/scene.xml", &[("mesh", "bom.obj")], [1.0; 3]);
+    everywhere("ply-faces-first/scene.xml", &[], [1.0; 3]);
+    everywhere("path-order/scene/scene.xml", &[], [1.0; 3]);
+    everywhere("texture-16bit-png/scene.xml", &[], [0.2159; 3]);
+    let concave = pixels(&film(&load("obj-concave/scene.xml", &[]), 64, 1, Needs::default()));
+    assert!((concave.iter().map(|pixel| pixel[0]).sum::<f32>() / 64.0 - 0.75).abs() < 0.01);
+    for (name, centre, corner) in [
+        ("include-object/scene.xml", 0.25, 1.0),
+        ("spectrum-plugins/bitmap.xml", 0.2159, 1.0),
+        ("spectrum-plugins/d65.xml", 1.0, 2.0),
+        ("spectrum-plugins/d65-texture.xml", 1.0, 2.0),
+        ("legacy-06/hex-rgb.xml", 0.2159, 1.0),
+        ("lenient-xml/ampersand.xml", 0.5, 1.0),
+        ("lenient-xml/blank-first-line.xml", 0.5, 1.0),
+        ("lenient-xml/comment-dashes.xml", 0.5, 1.0),
+        ("lenient-xml/latin1.xml", 0.5, 1.0),
+        ("integrator-parameters/scene.xml", 0.5, 1.0),
+    ] {
+        let (found_centre, found_corner) = centre_and_corner(&load(name, &[]));
+        near(found_centre, [centre; 3], name);
+        near(found_corner, [corner; 3], name);
+    }
+    near(centre_and_corner(&load("top-level-references/scene.xml", &[])).0, [3.0, 2.0, 1.0], "top-level-references");
+    for entry in fs::read_dir(folder.join("legacy-06")).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_some_and(|extension| extension == "xml") {
+            load(Path::new("legacy-06").join(path.file_name().unwrap()).to_str().unwrap(), &[]);
+        }
+    }
+    assert_eq!(load("legacy-06/gpt.xml", &[]).integrator().max_depth, 12);
+    let options = load::Options { parameters: vec![("angel".into(), "30".into())], ..load::Options::default() };
+    let message = load::load(&folder.join("unused-definition/scene.xml"), &options).err().unwrap().to_string();
+    assert!(message.contains("no parameter `angel`; it has `angle`"), "{message}");
+    let alpha = load("alpha/scene.xml", &[]);
+    let frame = film(&alpha, 64, 1, Needs { alpha: alpha.sensor().wants_alpha(), ..Needs::default() }).develop();
+    let alpha = &frame.get(Layer::Alpha).unwrap().data;
+    assert!(alpha[8 * 16 + 8] == 1.0 && alpha[0] == 0.0);
+    assert!((alpha.iter().sum::<f32>() / 256.0 - 0.349).abs() < 5e-3, "{}", alpha.iter().sum::<f32>() / 256.0);
+}
