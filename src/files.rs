@@ -64,16 +64,20 @@ fn folder(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// A name beside `path` with its extension, by which image formats are chosen.
+/// Longest name of a file, in bytes.
+const LONGEST: usize = 255;
+
+/// A name beside `path` with its extension, by which image formats are chosen. Of a name that is as long as names may be
+/// its start is enough.
 fn part(path: &Path) -> PathBuf {
-    let mut name = std::ffi::OsString::from(".");
-    name.push(path.file_stem().unwrap_or_default());
-    name.push(".part");
-    if let Some(extension) = path.extension() {
-        name.push(".");
-        name.push(extension);
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let extension = path.extension().map_or(String::new(), |extension| format!(".{}", extension.to_string_lossy()));
+    let room = LONGEST.saturating_sub("..part".len() + extension.len());
+    let mut length = room.min(stem.len());
+    while !stem.is_char_boundary(length) {
+        length -= 1;
     }
-    path.with_file_name(name)
+    path.with_file_name(format!(".{}.part{extension}", &stem[..length]))
 }
 
 #[cfg(test)]
@@ -95,6 +99,18 @@ mod tests {
         replace(&path, put("two")).unwrap();
         assert_eq!(fs::read_to_string(&path).unwrap(), "two");
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn names_may_be_as_long_as_they_can() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["x".repeat(251) + ".exr", "\u{e4}".repeat(125) + "y.exr"] {
+            let path = folder.path().join(&name);
+            claim(&path).unwrap();
+            write(&path, "x").unwrap();
+            assert_eq!((name.len() > 250, fs::read_to_string(&path).unwrap().as_str()), (true, "x"));
+        }
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2);
     }
 
     #[test]

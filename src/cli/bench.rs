@@ -219,11 +219,11 @@ fn write_page(
     for scene in scenes {
         let (name, truth) = Truth::of(scene, reference(args))?;
         let shown = methods.iter().filter_map(|&method| {
-            Some(Shown { label: method.to_owned(), image: store.image(&name, method, &budget)? })
+            Some(Shown { label: method.to_owned(), picture: store.image(&name, method, &budget)?.into() })
         });
         let images: Vec<_> = shown.collect();
         if !images.is_empty() {
-            views.push(View { name: format!("{name}, {budget}"), reference: truth.image, images });
+            views.push(View { name: format!("{name}, {budget}"), reference: truth.image.into(), images });
         }
     }
     let changes = baseline.map_or_else(Vec::new, |then| changes(&store.results, then, "relmse"));

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use anyhow::{Context, Result, bail};
 use fluxion::error::Error;
 use fluxion::files;
-use fluxion::image::{Image, io};
+use fluxion::image::io::{self, Picture};
 use fluxion::metrics::{self, METRICS};
 use fluxion::report::{Page, Shown, View, heat};
 
@@ -33,6 +33,9 @@ pub struct Args {
     html: Option<PathBuf>,
 }
 
+/// The figure of images with alpha, with its description. Colours are compared multiplied by theirs.
+const ALPHA: (&str, &str) = ("alpha", "mean of |I - R| of the alpha channels");
+
 /// Measures with every metric.
 pub fn run(args: &Args) -> Result<ExitCode> {
     let metric = metrics::find(&args.metric).ok_or_else(|| {
@@ -40,8 +43,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         Error::Usage(format!("metric `{}` is not known; there are {}", args.metric, names.join(", ")))
     })?;
     let Some((reference, paths)) = args.images.split_last() else { bail!("there is no image") };
-    let images = paths.iter().map(|path| io::read_color(path)).collect::<Result<Vec<_>, _>>()?;
-    let reference = io::read_color(reference)?;
+    let images = paths.iter().map(|path| io::read_picture(path)).collect::<Result<Vec<_>, _>>()?;
+    let reference = io::read_picture(reference)?;
     let maps: Vec<_> = args.map.iter().cloned().collect();
     let inputs: Vec<_> = args.images.iter().map(PathBuf::as_path).collect();
     let _claims = Claims::new(&maps, &[&args.json, &args.html], &inputs)?;
@@ -52,13 +55,18 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             object.insert("image".into(), path.display().to_string().into());
         }
         for metric in METRICS {
-            let measured = metric.measure(image, &reference).with_context(|| path.display().to_string())?;
+            let measured =
+                metric.measure(&image.color, &reference.color).with_context(|| path.display().to_string())?;
             object.insert(metric.id.into(), measured.mean.into());
+        }
+        if let (Some(alpha), Some(expected)) = (&image.alpha, &reference.alpha) {
+            let apart = alpha.data.iter().zip(&expected.data).map(|(a, b)| f64::from((a - b).abs())).sum::<f64>();
+            object.insert(ALPHA.0.into(), (apart / alpha.data.len() as f64).into());
         }
         objects.push(object);
     }
     if let Some(path) = &args.map {
-        let map = metric.measure(&images[0], &reference)?.map;
+        let map = metric.measure(&images[0].color, &reference.color)?.map;
         let map = map.ok_or_else(|| Error::Usage(format!("metric `{}` has no map", args.metric)))?;
         io::write_color(path, &heat(&map, None), &io::Extras::default())?;
     }
@@ -77,16 +85,17 @@ fn print(object: &serde_json::Map<String, serde_json::Value>, path: &Path) -> Re
     if object.contains_key("image") {
         out!("{}", path.display())?;
     }
-    for metric in METRICS {
-        let value = object[metric.id].as_f64().unwrap_or(f64::NAN);
-        out!("{:>10}  {value:<12.6}  {}", metric.id, metric.summary)?;
+    let summaries = METRICS.iter().map(|metric| (metric.id, metric.summary)).chain([ALPHA]);
+    for (id, summary) in summaries.filter(|(id, _)| object.contains_key(*id)) {
+        let value = object[id].as_f64().unwrap_or(f64::NAN);
+        out!("{id:>10}  {value:<12.6}  {summary}")?;
     }
     Ok(())
 }
 
-fn page(paths: &[PathBuf], images: Vec<Image>, reference: Image) -> Result<String, Error> {
+fn page(paths: &[PathBuf], images: Vec<Picture>, reference: Picture) -> Result<String, Error> {
     let names: Vec<_> = paths.iter().map(|path| path.display().to_string()).collect();
-    let shown = names.iter().zip(images).map(|(name, image)| Shown { label: name.clone(), image });
+    let shown = names.iter().zip(images).map(|(name, picture)| Shown { label: name.clone(), picture });
     let view = View { name: names.join(", "), reference, images: shown.collect() };
     Page { title: "Images compared".into(), views: vec![view], ..Page::default() }.html()
 }

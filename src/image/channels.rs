@@ -83,6 +83,14 @@ impl ColorChannels {
         Ok(Self { order: [channel; 3], decoding: [decoding; 3], to_rec709: None })
     }
 
+    /// Channel of the alpha that belongs to the colours, if there is one.
+    pub fn alpha(&self, file: &ImageFile) -> Option<usize> {
+        let layer = |name: &str| name.rsplit_once('.').map_or(String::new(), |(layer, _)| layer.to_lowercase());
+        let own = layer(&file.channels[self.order[0]]);
+        let is_alpha = |name: &String| name.rsplit('.').next().is_some_and(|part| part.eq_ignore_ascii_case("a"));
+        file.channels.iter().position(|name| is_alpha(name) && layer(name) == own).filter(|at| !self.order.contains(at))
+    }
+
     /// The linear colour of a pixel's samples.
     #[inline]
     pub fn color(&self, pixel: &[f32]) -> Rgb {

@@ -101,13 +101,43 @@ fn samples(image: &Image, i: usize) -> &[f32] {
     &image.data[i * image.channels..][..image.channels]
 }
 
-/// Reads the colours of an image file as linear RGB.
-pub fn read_color(path: &Path) -> Result<Image> {
+/// A colour image, multiplied by its alpha if it has one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Picture {
+    /// Linear RGB.
+    pub color: Image,
+    /// Share of every pixel that is covered.
+    pub alpha: Option<Image>,
+}
+
+impl From<Image> for Picture {
+    fn from(color: Image) -> Self {
+        Self { color, alpha: None }
+    }
+}
+
+/// Reads the colours of an image file as linear RGB, and its alpha.
+pub fn read_picture(path: &Path) -> Result<Picture> {
     let file = ImageFile::open(path)?;
     let colors = ColorChannels::of(&file, path, false)?;
-    let pixels = file.floats()?;
-    let data = pixels.chunks_exact(file.channels.len()).flat_map(|pixel| colors.color(pixel).to_array()).collect();
-    Ok(Image { width: file.width, height: file.height, channels: 3, data })
+    let at = colors.alpha(&file);
+    // Display formats hold colours without their alpha.
+    let multiplied = file.storage[colors.order[0]] == Storage::Float;
+    let (samples, count) = (file.floats()?, file.channels.len());
+    let (mut color, mut alpha) = (Vec::with_capacity(3 * samples.len() / count), Vec::new());
+    for pixel in samples.chunks_exact(count) {
+        let covered = at.map(|at| pixel[at]);
+        let share = covered.filter(|_| !multiplied).unwrap_or(1.0);
+        color.extend((colors.color(pixel) * share).to_array());
+        alpha.extend(covered);
+    }
+    let image = |channels, data| Image { width: file.width, height: file.height, channels, data };
+    Ok(Picture { color: image(3, color), alpha: at.map(|_| image(1, alpha)) })
+}
+
+/// Reads the colours of an image file as linear RGB, multiplied by its alpha if it has one.
+pub fn read_color(path: &Path) -> Result<Image> {
+    Ok(read_picture(path)?.color)
 }
 
 #[cfg(test)]
@@ -128,6 +158,17 @@ mod tests {
             assert_eq!(back.shape(), image.shape());
             let worst = back.data.iter().zip(&image.data).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
             assert!(worst <= tolerance, "{name}: {worst}");
+        }
+        let alpha = Image { channels: 1, data: vec![0.5; 40 * 24], ..image.clone() };
+        for (name, tolerance) in [("a.exr", 0.0), ("a.tiff", 0.0), ("a.png", 0.01)] {
+            let path = folder.path().join(name);
+            let extras = Extras { alpha: Some(&alpha), ..Extras::default() };
+            // Multiplied by alpha, no colour is brighter than that.
+            let dimmed = Image { data: image.data.iter().map(|value| 0.5 * value).collect(), ..image.clone() };
+            write_color(&path, &dimmed, &extras).unwrap();
+            let Picture { color, alpha: back } = read_picture(&path).unwrap();
+            let far = |a: &Image, b: &Image| a.data.iter().zip(&b.data).any(|(a, b)| (a - b).abs() > tolerance);
+            assert!(!far(&color, &dimmed) && !far(&back.unwrap(), &alpha), "{name}");
         }
         let error = write_color(&folder.path().join("a.xyz"), &image, &Extras::default()).unwrap_err();
         assert!(error.to_string().contains("not one of exr"), "{error}");

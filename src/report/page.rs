@@ -11,6 +11,7 @@ use super::summary::Summary;
 use crate::bench::Results;
 use crate::error::{Error, Result};
 use crate::image::Image;
+use crate::image::io::Picture;
 use crate::metrics::{self, METRICS};
 
 /// Pixels on each side of a crop, and how many are shown.
@@ -25,7 +26,7 @@ pub struct Shown {
     /// Name of the scene.
     pub label: String,
     /// Linear radiance.
-    pub image: Image,
+    pub picture: Picture,
 }
 
 /// Images of the same scene and their reference.
@@ -33,7 +34,7 @@ pub struct View {
     /// Name of the scene.
     pub name: String,
     /// The reference image.
-    pub reference: Image,
+    pub reference: Picture,
     /// The images.
     pub images: Vec<Shown>,
 }
@@ -51,8 +52,9 @@ pub struct Page<'a> {
     pub views: Vec<View>,
 }
 
+/// A picture as the page holds it.
 #[derive(Serialize)]
-struct Picture {
+struct Encoded {
     label: String,
     source: String,
     map: Option<String>,
@@ -96,8 +98,9 @@ impl Page<'_> {
 fn view(view: &View) -> Result<serde_json::Value> {
     let metric = metrics::find("relmse").ok_or_else(|| Error::Usage("there is no metric relmse".into()))?;
     let mut maps = Vec::new();
-    for Shown { label, image } in &view.images {
-        let map = metric.measure(image, &view.reference);
+    let reference = &view.reference.color;
+    for Shown { label, picture } in &view.images {
+        let map = metric.measure(&picture.color, reference);
         let map = map.map_err(|error| Error::Usage(format!("{label} of {}: {error}", view.name)))?.map;
         maps.push(map.unwrap_or_default());
     }
@@ -106,17 +109,17 @@ fn view(view: &View) -> Result<serde_json::Value> {
     tops.sort_by(f32::total_cmp);
     let top = tops.get(tops.len() / 2).copied();
     let mut pictures = Vec::new();
-    for (Shown { label, image }, map) in view.images.iter().zip(&maps) {
+    for (Shown { label, picture }, map) in view.images.iter().zip(&maps) {
         let mut metrics = BTreeMap::new();
         for metric in METRICS {
-            metrics.insert(metric.id, metric.measure(image, &view.reference)?.mean);
+            metrics.insert(metric.id, metric.measure(&picture.color, reference)?.mean);
         }
-        let (source, map) = (data_url(&tone_mapped(image))?, Some(data_url(&heat(map, top))?));
-        pictures.push(Picture { label: label.clone(), source, map, metrics });
+        let (source, map) = (data_url(&tone_mapped(picture))?, Some(data_url(&heat(map, top))?));
+        pictures.push(Encoded { label: label.clone(), source, map, metrics });
     }
     let source = data_url(&tone_mapped(&view.reference))?;
-    pictures.push(Picture { label: "reference".into(), source, map: None, metrics: BTreeMap::new() });
-    let (width, height) = (view.reference.width, view.reference.height);
+    pictures.push(Encoded { label: "reference".into(), source, map: None, metrics: BTreeMap::new() });
+    let (width, height) = (reference.width, reference.height);
     Ok(json!({
         "name": view.name, "width": width, "height": height, "top": top, "pictures": pictures, "crops": crops(&maps),
     }))

@@ -5,7 +5,11 @@ use base64::engine::general_purpose::STANDARD;
 
 use crate::error::{Error, Result};
 use crate::image::Image;
+use crate::image::io::Picture;
 use crate::math::{Rgb, srgb_encode, vec3};
+
+/// Side of the squares that transparent pixels lie on.
+const SQUARE: usize = 8;
 
 /// An error map in colours: blue is none, red the worst hundredth of the values or `top`.
 pub fn heat(map: &Image, top: Option<f32>) -> Image {
@@ -25,10 +29,15 @@ pub fn worst(map: &Image) -> f32 {
     sorted.get(sorted.len().saturating_sub(1) * 99 / 100).copied().unwrap_or_default()
 }
 
-/// The image as FLIP sees it: each channel x / (1 + x), then sRGB.
-pub fn tone_mapped(image: &Image) -> Image {
-    let compress = |&value: &f32| value.max(0.0) / (1.0 + value.max(0.0));
-    Image { data: image.data.iter().map(compress).collect(), ..*image }
+/// The picture as FLIP sees it: each channel x / (1 + x), then sRGB. What shows through lies on a checkerboard.
+pub fn tone_mapped(picture: &Picture) -> Image {
+    let compress = |value: f32| value.max(0.0) / (1.0 + value.max(0.0));
+    let Picture { color, alpha } = picture;
+    Image::from_rgb(color.width, color.height, |x, y| {
+        let behind = if (x / SQUARE + y / SQUARE).is_multiple_of(2) { 0.25 } else { 0.4 };
+        let uncovered = alpha.as_ref().map_or(0.0, |alpha| 1.0 - alpha.pixel(x, y)[0]);
+        Rgb::from_array(color.rgb(x, y).to_array().map(compress)) + behind * uncovered
+    })
 }
 
 /// An RGB image of values in [0, 1] as the address of a PNG that contains it.

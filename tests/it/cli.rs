@@ -5,17 +5,17 @@ use std::path::Path;
 use assert_cmd::Command;
 use fluxion::image::io::read_color;
 
-fn fluxion(folder: &Path) -> Command {
+pub fn fluxion(folder: &Path) -> Command {
     let mut command = Command::cargo_bin("fluxion").unwrap();
     command.current_dir(folder);
     command
 }
 
-fn scene(name: &str) -> String {
+pub fn scene(name: &str) -> String {
     format!("{}/scenes/{name}/scene.xml", env!("CARGO_MANIFEST_DIR"))
 }
 
-fn stderr(command: &mut Command) -> (i32, String) {
+pub fn stderr(command: &mut Command) -> (i32, String) {
     let output = command.output().unwrap();
     (output.status.code().unwrap_or(-1), String::from_utf8_lossy(&output.stderr).into_owned())
 }

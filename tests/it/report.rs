@@ -46,8 +46,8 @@ fn results(good: f64) -> Results {
 
 fn view() -> View {
     let image = |tint: f32| Image::from_rgb(64, 48, |x, y| vec3(tint, x as f32 / 64.0, y as f32 / 48.0));
-    let shown = |label: &str, tint| Shown { label: label.into(), image: image(tint) };
-    View { name: "room".into(), reference: image(0.5), images: vec![shown("primal", 0.9), shown("good", 0.45)] }
+    let shown = |label: &str, tint| Shown { label: label.into(), picture: image(tint).into() };
+    View { name: "room".into(), reference: image(0.5).into(), images: vec![shown("primal", 0.9), shown("good", 0.45)] }
 }
 
 /// What the page does when it is used, as lines of text.
