@@ -195,7 +195,7 @@ fn component(name: &str) -> &str {
 }
 
 /// Bins of two independent halves, for methods that compare these: the colour with noise of its own variance added, and with
-/// it taken off.
+/// it taken off (Leiner et al. 2023).
 fn add_bins(frame: &mut Frame) {
     let (Some(color), Some(variance)) = (frame.get(Layer::Color), frame.get(Layer::ColorVariance)) else { return };
     if frame.get(Layer::BinColor(0)).is_some() {

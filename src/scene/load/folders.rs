@@ -59,7 +59,7 @@ fn similar(folder: &Path, name: &str) -> Option<PathBuf> {
         let mut entries = std::fs::read_dir(here).ok()?.filter_map(|entry| entry.ok()?.file_name().into_string().ok());
         found.push(entries.find(|entry| entry.to_lowercase() == part.to_lowercase())?);
     }
-    folder.join(&found).is_file().then_some(found)
+    folder.join(&found).exists().then_some(found)
 }
 
 #[cfg(test)]

@@ -174,7 +174,7 @@ impl Parser {
             "path" => {
                 let value = self.attribute(at, "value")?;
                 let folder = self.tree.folders.find(&value);
-                let folder = folder.ok_or_else(|| at.loc().invalid(format!("no folder `{value}`")))?;
+                let folder = folder.ok_or_else(|| at.loc().invalid(self.tree.folders.missing(&value)))?;
                 self.tree.folders.prepend(folder);
             }
             "alias" => {
