@@ -61,6 +61,13 @@ extern "C" void *fluxion_image_open(const char *path, FluxionImageSpec *spec, Fl
     fail(error, "", "volumes and deep images are not supported");
     return nullptr;
   }
+  // A reader makes room for a tile as large as the header claims.
+  const double tile = static_cast<double>(found.tile_width) * found.tile_height * found.nchannels;
+  const double image_samples = static_cast<double>(found.width) * found.height * found.nchannels;
+  if (tile > 16777216.0 && tile > image_samples) {
+    fail(error, "", "the header claims tiles that are larger than the image");
+    return nullptr;
+  }
   spec->width = found.width;
   spec->height = found.height;
   spec->channels = found.nchannels;

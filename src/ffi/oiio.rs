@@ -73,6 +73,10 @@ const MAX_SAMPLES: usize = 1 << 32;
 /// pictures like that.
 const MAX_SAMPLES_PER_BYTE: usize = 1 << 11;
 
+/// Rows that some of OpenEXR's compressions work on at once, and the samples in them that are no reason for doubt.
+const ROWS_AT_ONCE: usize = 256;
+const ROOM: usize = 1 << 27;
+
 /// An image file whose header has been read.
 pub struct ImageFile<'a> {
     /// Pixels in a row.
@@ -156,6 +160,12 @@ impl<'a> ImageFile<'a> {
         let samples = file.samples();
         if samples == 0 || samples > MAX_SAMPLES.min(bytes.saturating_mul(MAX_SAMPLES_PER_BYTE)) {
             let what = format!("the header claims {width}x{height} pixels of {} channels", spec.channels);
+            return Err(Error::io(path, what));
+        }
+        // OpenEXR makes room for many rows, however few there are.
+        let room = ROWS_AT_ONCE.saturating_mul(samples / height);
+        if file.format == "openexr" && room > ROOM.max(4 * samples) {
+            let what = format!("the header claims rows of {width} pixels, but {height} of them");
             return Err(Error::io(path, what));
         }
         Ok(file)

@@ -1,5 +1,7 @@
 //! Film to frame: sums become means and variances, and the two ends of every edge are joined.
 
+use rayon::prelude::*;
+
 use super::source::{Axis, Source};
 use super::statistic::{Record, Statistic};
 use super::{Film, Frame, Layer, Tile};
@@ -58,38 +60,48 @@ impl Film {
 
     /// The tile of a pixel and the pixel's index in it.
     fn at(&self, x: usize, y: usize) -> (&Tile, usize) {
-        let columns = self.width.div_ceil(super::TILE);
-        let tile = &self.tiles[y / super::TILE * columns + x / super::TILE];
+        let tile = &self.tiles[y / super::TILE * self.columns() + x / super::TILE];
         (tile, (y - tile.y) * tile.width + (x - tile.x))
     }
 
     /// An image from a function of tile, index in the tile, and channel.
-    fn image(&self, channels: usize, value: impl Fn(&Tile, usize, usize) -> f32) -> Image {
+    fn image(&self, channels: usize, value: impl Fn(&Tile, usize, usize) -> f32 + Sync) -> Image {
         let mut image = Image::new(self.width, self.height, channels);
-        for tile in &self.tiles {
-            for i in 0..tile.counts.len() {
-                let (x, y) = tile.pixel(i);
-                image.pixel_mut(x, y).iter_mut().enumerate().for_each(|(c, slot)| *slot = value(tile, i, c));
+        let row = self.width * channels;
+        let bands = image.data.par_chunks_mut(super::TILE * row.max(1));
+        bands.zip(self.tiles.par_chunks(self.columns())).for_each(|(band, tiles)| {
+            for tile in tiles {
+                for i in 0..tile.counts.len() {
+                    let at = i / tile.width * row + (tile.x + i % tile.width) * channels;
+                    let pixel = band[at..at + channels].iter_mut().enumerate();
+                    pixel.for_each(|(c, slot)| *slot = value(tile, i, c));
+                }
             }
-        }
+        });
         image
     }
 
     /// Sums of a value at the near and at the far end of every edge along an axis. An edge that has been sampled from
     /// one end only is left zero: half of it is no estimate.
-    fn edge_image(&self, axis: Axis, value: impl Fn(&Tile, usize, End, usize) -> f32) -> Image {
+    fn edge_image(&self, axis: Axis, value: impl Fn(&Tile, usize, End, usize) -> f32 + Sync) -> Image {
         let mut image = Image::new(self.width, self.height, 3);
-        for y in 0..self.height - axis.step.1 {
-            for x in 0..self.width - axis.step.0 {
+        let rows = image.data.par_chunks_mut(3 * self.width.max(1)).enumerate().take(self.height - axis.step.1);
+        rows.for_each(|(y, row)| {
+            for (x, pixel) in row.chunks_exact_mut(3).enumerate().take(self.width - axis.step.0) {
                 let ((near, i), (far, j)) = (self.at(x, y), self.at(x + axis.step.0, y + axis.step.1));
                 if near.edge_count(i) == 0 || far.edge_count(j) == 0 {
                     continue;
                 }
-                let pixel = image.pixel_mut(x, y).iter_mut().enumerate();
-                pixel.for_each(|(c, slot)| *slot = value(near, i, End::Near, c) + value(far, j, End::Far, c));
+                let slots = pixel.iter_mut().enumerate();
+                slots.for_each(|(c, slot)| *slot = value(near, i, End::Near, c) + value(far, j, End::Far, c));
             }
-        }
+        });
         image
+    }
+
+    /// Tiles in a row of them.
+    fn columns(&self) -> usize {
+        self.width.div_ceil(super::TILE).max(1)
     }
 }
 

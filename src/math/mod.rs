@@ -1,10 +1,11 @@
 //! Vectors, frames, random numbers and the small pieces of sampling everything else is made of.
 
 pub mod alias;
-pub mod discrete;
 pub mod frame;
 pub mod fresnel;
+pub mod half;
 pub mod lanes;
+pub mod partition;
 pub mod quadrature;
 pub mod rng;
 pub mod warp;

@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use super::{Emitter, LightPoint, Position};
 use crate::error::Result;
-use crate::math::discrete::Grid;
 use crate::math::lanes::{Lanes, Lanes3, Mask};
+use crate::math::partition::Partition;
 use crate::math::{Mat4, Rgb, Vec2, Vec3, Vec4, luminance, vec2, vec3};
 use crate::scene::Bounds;
 use crate::scene::load::props::Object;
@@ -47,7 +47,7 @@ pub struct EnvMap {
     to_world: Mat4,
     to_local: Mat4,
     /// Density over the unit square; `None` for a black image.
-    grid: Option<Grid>,
+    partition: Option<Partition>,
     /// Mean luminance over directions.
     mean: f32,
     area: f32,
@@ -68,9 +68,9 @@ impl EnvMap {
     #[inline(always)]
     pub fn sample_packet(&self, [u, v]: [Lanes; 2], active: Mask) -> EnvmapSample {
         let mut sample = EnvmapSample { direction: Lanes3::ZERO, pdf: Lanes::ZERO, radiance: Lanes3::ZERO };
-        let Some(grid) = &self.grid else { return sample };
+        let Some(partition) = &self.partition else { return sample };
         let (mut x, mut y, mut cell_pdf) = (Lanes::ZERO, Lanes::ZERO, Lanes::ZERO);
-        let points = grid.sample_packet(u.0, v.0, active);
+        let points = partition.sample_packet(u.0, v.0, active);
         for lane in active.lanes() {
             let (uv, pdf) = points[lane];
             (x.0[lane], y.0[lane], cell_pdf.0[lane]) = (uv.x, uv.y, pdf);
@@ -103,7 +103,7 @@ impl EnvMap {
         let total: f64 = weights.iter().map(|&w| f64::from(w)).sum();
         let mean = (total / (f64::from(sines) * width as f64)) as f32 * scale;
         let to_local = to_world.inverse();
-        Self { texels, scale, to_world, to_local, grid: Grid::new(&weights, width), mean, area: 1.0 }
+        Self { texels, scale, to_world, to_local, partition: Partition::new(&weights, width), mean, area: 1.0 }
     }
 
     fn uv(&self, direction: Vec3) -> Vec2 {
@@ -134,7 +134,7 @@ fn far(direction: Vec3, uv: Vec2) -> LightPoint {
 
 impl Emitter for EnvMap {
     fn sample(&self, _from: Vec3, u: Vec2) -> Option<LightPoint> {
-        let (uv, _) = self.grid.as_ref()?.sample(u);
+        let (uv, _) = self.partition.as_ref()?.sample(u);
         let (sin_phi, cos_phi) = (TAU * uv.x).sin_cos();
         let (sin, cos) = (PI * uv.y).sin_cos();
         let direction = self.to_world.transform_vector3(vec3(sin_phi * sin, cos, -cos_phi * sin));
@@ -146,10 +146,10 @@ impl Emitter for EnvMap {
     }
 
     fn pdf(&self, _from: Vec3, point: &LightPoint) -> f32 {
-        let (Position::Infinity { .. }, Some(grid)) = (point.position, &self.grid) else { return 0.0 };
+        let (Position::Infinity { .. }, Some(partition)) = (point.position, &self.partition) else { return 0.0 };
         let uv = point.at.uv;
         let sine = (PI * uv.y).sin().max(1e-6);
-        grid.pdf(uv) / (2.0 * PI * PI * sine)
+        partition.pdf(uv) / (2.0 * PI * PI * sine)
     }
 
     fn radiance(&self, point: &LightPoint, _direction: Vec3) -> Rgb {

@@ -11,8 +11,8 @@ pub const PLUGINS: &[(&str, &str)] = &[
     ("volpath", "as path; scenes have no media"),
     ("volpathmis", "as path; scenes have no media"),
     ("direct", "as path with max_depth 2; emitter_samples, bsdf_samples, shading_samples (ignored)"),
-    ("moment", "one nested integrator"),
-    ("aov", "aovs (ignored: layers hold them), one nested integrator"),
+    ("moment", "nested integrators, of which the first counts"),
+    ("aov", "aovs (ignored: layers hold them), nested integrators, of which the first counts"),
     ("any other", "as path, with a warning"),
 ];
 
@@ -28,55 +28,46 @@ const SCHEDULING: &[&str] =
 pub fn load(object: &Object, loader: &mut Loader) -> Result<Integrator> {
     let plugin = object.plugin.as_str();
     object.ignore(SCHEDULING);
+    let wrapped = wrapped(object, loader)?;
     if ["moment", "aov"].contains(&plugin) {
-        let integrator = nested(object, loader)?;
-        object.all_used("aovs, one nested integrator")?;
-        return Ok(integrator);
+        loader.warn_unused(object)?;
+        return Ok(wrapped.unwrap_or_default());
     }
-    let integrator = path(object)?;
+    let own = path(object)?;
+    if object.boolean("strict_normals", false)? {
+        let what = "`strict_normals` is ignored: light passes where shading normals and surface disagree";
+        loader.warn(&object.loc_of("strict_normals"), what)?;
+    }
     if plugin == "direct" {
         loader.warn_unused(object)?;
-        return Ok(Integrator { max_depth: 2, ..integrator });
+        return Ok(Integrator { max_depth: 2, ..own });
     }
     if PATH_TRACERS.contains(&plugin) {
-        if object.boolean("strict_normals", false)? {
-            let what = "`strict_normals` is ignored: light passes where shading normals and surface disagree";
-            loader.warn(&object.loc_of("strict_normals"), what)?;
-        }
         loader.warn_unused(object)?;
-    } else {
-        // What integrators such as `adaptive` are wrapped around says how deep paths go.
-        let integrator = wrapped(object, loader)?.unwrap_or(integrator);
-        let depth = if integrator.max_depth == u32::MAX { "-1".into() } else { integrator.max_depth.to_string() };
-        let what = format!("integrator `{plugin}` is not known here: the scene is path traced with max_depth {depth}");
-        loader.warn(&object.loc, what)?;
-        return Ok(integrator);
+        return Ok(own);
     }
+    // What integrators such as `adaptive` are wrapped around says how deep paths go.
+    let integrator = wrapped.unwrap_or(own);
+    let depth = if integrator.max_depth == u32::MAX { "-1".into() } else { integrator.max_depth.to_string() };
+    let what = format!("integrator `{plugin}` is not known here: the scene is path traced with max_depth {depth}");
+    loader.warn(&object.loc, what)?;
     Ok(integrator)
 }
 
-/// The depths of the first integrator nested in another one.
+/// The depths of the first of the integrators nested in another one.
 fn wrapped(object: &Object, loader: &mut Loader) -> Result<Option<Integrator>> {
+    let mut first = None;
     for property in object.nested() {
         let nested = loader.resolve(property)?;
-        if nested.class == "integrator" {
-            return loader.guarded(object, |loader| load(&nested, loader)).map(Some);
+        if nested.class != "integrator" {
+            continue;
         }
-    }
-    Ok(None)
-}
-
-fn nested(object: &Object, loader: &mut Loader) -> Result<Integrator> {
-    let mut found = None;
-    for property in object.nested() {
         property.take();
-        let nested = loader.resolve(property)?;
-        if found.is_some() || nested.class != "integrator" || ["moment", "aov"].contains(&nested.plugin.as_str()) {
-            return Err(nested.loc.unsupported(format!("`{}` takes one path integrator", object.plugin)));
+        if first.is_none() {
+            first = Some(loader.guarded(object, |loader| load(&nested, loader))?);
         }
-        found = Some(load(&nested, loader)?);
     }
-    Ok(found.unwrap_or_default())
+    Ok(first)
 }
 
 fn path(object: &Object) -> Result<Integrator> {

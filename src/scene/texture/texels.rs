@@ -7,7 +7,7 @@ use std::sync::{Arc, OnceLock};
 use crate::error::Result;
 use crate::image::channels::{ColorChannels, Decoding};
 use crate::image::io::{CachedTexture, ImageFile, TextureSystem};
-use crate::math::{Rgb, srgb_decode, vec3};
+use crate::math::{Rgb, half, srgb_decode, vec3};
 
 /// Part of an image file that is read.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
@@ -31,6 +31,8 @@ enum Samples {
     /// Eight bits, with the linear values of all bytes.
     Byte(Vec<[u8; 3]>, &'static [f32; 256]),
     Float(Vec<Rgb>),
+    /// Floats that sixteen bits are enough for: half of the memory to wait for.
+    Half(Vec<[u16; 3]>),
     /// Beyond the memory bound.
     Cached {
         texture: CachedTexture,
@@ -95,7 +97,7 @@ impl Texels {
                 infinite.fetch_add(usize::from(!color.is_finite()), Ordering::Relaxed);
                 finite(color)
             };
-            Samples::Float(file.floats()?.chunks_exact(count).map(texel).collect())
+            compact(file.floats()?.chunks_exact(count).map(texel).collect())
         };
         Ok((Self { width, height, samples }, infinite.into_inner()))
     }
@@ -110,6 +112,7 @@ impl Texels {
     pub fn texel(&self, x: usize, y: usize) -> Rgb {
         match &self.samples {
             Samples::Float(texels) => texels[y * self.width + x],
+            Samples::Half(texels) => expand(texels[y * self.width + x]),
             Samples::Byte(texels, table) => decode(texels[y * self.width + x], table),
             Samples::Cached { texture, origin, colors } => {
                 let mut samples = [0.0; MAX_CHANNELS];
@@ -132,10 +135,28 @@ impl Texels {
         };
         match &self.samples {
             Samples::Float(texels) => of(&|index| texels[index]),
+            Samples::Half(texels) => of(&|index| expand(texels[index])),
             Samples::Byte(texels, table) => of(&|index| decode(texels[index], table)),
             Samples::Cached { .. } => of(&|index| self.texel(index % self.width, index / self.width)),
         }
     }
+}
+
+/// Texels as half floats, if these are the same numbers.
+fn compact(texels: Vec<Rgb>) -> Samples {
+    let half = |texel: &Rgb| {
+        let [r, g, b] = texel.to_array().map(half::encode);
+        Some([r?, g?, b?])
+    };
+    match texels.iter().map(half).collect() {
+        Some(halves) => Samples::Half(halves),
+        None => Samples::Float(texels),
+    }
+}
+
+#[inline(always)]
+fn expand([r, g, b]: [u16; 3]) -> Rgb {
+    vec3(half::decode(r), half::decode(g), half::decode(b))
 }
 
 /// The largest half float, which a sun that was brighter is clipped to.

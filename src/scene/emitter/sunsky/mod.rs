@@ -11,7 +11,7 @@ use hw_skymodel::rgb::{Channel, SkyParams, SkyState};
 use self::position::Position;
 use super::{Emitter, LightPoint, Position as PointPosition};
 use crate::error::Result;
-use crate::math::discrete::Grid;
+use crate::math::partition::Partition;
 use crate::math::{Frame, Mat4, Rgb, Vec2, Vec3, luminance, vec2, vec3, warp};
 use crate::scene::Bounds;
 use crate::scene::load::props::Object;
@@ -141,7 +141,7 @@ struct SunSky {
     /// Share of samples that go to the disk.
     disk_share: f32,
     /// Density of the sky over azimuth and height, in which directions are even.
-    grid: Option<Grid>,
+    partition: Option<Partition>,
     to_world: Mat4,
     to_local: Mat4,
     /// Power through an area of one.
@@ -171,7 +171,7 @@ impl SunSky {
             disk,
             versine,
             disk_share: if flux > 0.0 { of_disk / flux } else { 0.0 },
-            grid: Grid::new(&weights, CELLS.0),
+            partition: Partition::new(&weights, CELLS.0),
             to_world,
             to_local: to_world.inverse(),
             flux,
@@ -208,7 +208,7 @@ impl Emitter for SunSky {
             Frame::around(self.center).to_world(warp::cone(vec2(u.x / self.disk_share, u.y), self.versine))
         } else {
             let rest = (u.x - self.disk_share) / (1.0 - self.disk_share);
-            direction(self.grid.as_ref()?.sample(vec2(rest, u.y)).0)
+            direction(self.partition.as_ref()?.sample(vec2(rest, u.y)).0)
         };
         Some(LightPoint::at_infinity(self.to_world(local), 0))
     }
@@ -218,7 +218,7 @@ impl Emitter for SunSky {
         let local = self.to_local(direction);
         let disk = if self.meets_disk(local) { self.disk_share / (TAU * self.versine) } else { 0.0 };
         let at = vec2((local.x.atan2(local.z) / TAU).rem_euclid(1.0), 0.5 * (local.y + 1.0));
-        let sky = self.grid.as_ref().map_or(0.0, |grid| grid.pdf(at)) / (2.0 * TAU);
+        let sky = self.partition.as_ref().map_or(0.0, |partition| partition.pdf(at)) / (2.0 * TAU);
         disk + (1.0 - self.disk_share) * sky
     }
 
