@@ -22,11 +22,16 @@ pub struct Args {
     #[arg(long, value_name = "MB", value_parser = clap::value_parser!(u64).range(1..1 << 40))]
     max_memory: Option<u64>,
     /// Exposure of png and jpg images, in powers of two: 1 makes them twice as bright
-    #[arg(long, default_value_t = 0.0, value_name = "EV", allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 0.0, value_name = "EV", allow_negative_numbers = true, value_parser = parse_exposure)]
     exposure: f32,
     /// Folder for the intermediate images of the method, as EXR files
     #[arg(long, value_name = "DIR")]
     notes: Option<PathBuf>,
+}
+
+fn parse_exposure(text: &str) -> Result<f32, String> {
+    let exposure = text.parse().ok().filter(|exposure: &f32| exposure.abs() <= 100.0);
+    exposure.ok_or_else(|| "an exposure is a number of powers of two, as in 1.5 or -2".into())
 }
 
 impl Args {

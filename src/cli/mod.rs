@@ -81,6 +81,14 @@ fn parse_size(text: &str) -> Result<(usize, usize), String> {
     ))
 }
 
+/// Threads, not so many that starting them takes longer than the work.
+fn parse_threads(text: &str) -> Result<usize, String> {
+    let threads = text.parse().ok().filter(|&threads| threads <= MAX_THREADS);
+    threads.ok_or_else(|| format!("threads are a number up to {MAX_THREADS}"))
+}
+
+const MAX_THREADS: usize = 1024;
+
 /// A positive number.
 fn parse_positive(text: &str) -> Result<f64, String> {
     let number = text.parse().ok().filter(|&number: &f64| number > 0.0 && number.is_finite());

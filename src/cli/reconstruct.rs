@@ -26,7 +26,7 @@ pub struct Args {
     #[command(flatten)]
     method: method::Args,
     /// Threads to work with (0: one per core)
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, value_parser = super::parse_threads)]
     threads: usize,
     /// JSON file for times and memory; - is standard output
     #[arg(long, value_name = "FILE")]

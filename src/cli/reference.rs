@@ -39,7 +39,7 @@ pub struct Args {
     #[arg(long, default_value_t = SEED)]
     seed: u64,
     /// Threads to work with (0: one per core)
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, value_parser = super::parse_threads)]
     threads: usize,
     /// Show no progress
     #[arg(short, long)]

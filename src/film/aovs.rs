@@ -35,6 +35,9 @@ const SECOND_MOMENT: &str = "m2_";
 pub fn complete(frame: &mut Frame, pixels: &Pixels, spp: Option<u32>) {
     let file = File::new(pixels);
     let mut groups = Vec::new();
+    if let (None, Some(color)) = (frame.get(Layer::Color), file.group("", COMPONENTS[0])) {
+        frame.set(Layer::Color, file.image(&color));
+    }
     for (layer, names) in NAMES {
         let group =
             if *layer == Layer::Depth { file.depth(names) } else { file.named(names, layer.info().channels.len()) };
@@ -155,11 +158,7 @@ impl<'a> File<'a> {
     fn color_variance(&self, counts: &[f32]) -> Option<Image> {
         if let Some(of_samples) = self.group("variance", COMPONENTS[0]) {
             let mut variance = self.image(&of_samples);
-            variance
-                .data
-                .iter_mut()
-                .enumerate()
-                .for_each(|(i, value)| *value = value.max(0.0) / counts[i / 3].max(1.0));
+            variance.data.iter_mut().enumerate().for_each(|(i, value)| *value /= counts[i / 3].max(1.0));
             return Some(variance);
         }
         let features: Vec<&str> = NAMES[1..].iter().flat_map(|(_, names)| names.iter().copied()).collect();

@@ -49,6 +49,10 @@ impl Frame {
         self.get(layer).ok_or_else(|| Error::Missing {
             layer: layer.channel_names().join(", "),
             remedy: match layer.info().flag {
+                "always" if layer == Layer::ColorVariance => {
+                    "`fluxion render --layers` writes it, and Mitsuba where an integrator `moment` is around the others"
+                        .into()
+                }
                 "always" if layer == Layer::Samples => "give the samples per pixel with --spp".into(),
                 "always" => "every file that `fluxion render --layers` writes has it".into(),
                 flag => format!("`fluxion render` records it with {flag}"),

@@ -13,6 +13,8 @@ pub enum Decoding {
     Linear,
     /// Display-encoded, as integers of any size are outside of exr files.
     Srgb,
+    /// Encoded by a power of one over this.
+    Gamma(f32),
     /// Integers of an exr file, which OpenImageIO gives as shares of the largest.
     Integer,
 }
@@ -24,9 +26,22 @@ impl Decoding {
         match self {
             Self::Linear => value,
             Self::Srgb => srgb_decode(value),
+            Self::Gamma(gamma) => value.max(0.0).powf(gamma),
             Self::Integer => (f64::from(value) * f64::from(u32::MAX)).round() as f32,
         }
     }
+}
+
+/// How a reader wants the integers of display formats.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Integers {
+    /// As colours in sRGB.
+    #[default]
+    Srgb,
+    /// As plain numbers.
+    Raw,
+    /// As colours that were encoded by a power of one over this.
+    Gamma(f32),
 }
 
 /// Red, green and blue in a file.
@@ -55,8 +70,8 @@ const GREY: &[&str] = &["y", "l", "i", "grey", "gray", "luminance"];
 
 impl ColorChannels {
     /// The colours of a file: R, G and B, or X, Y and Z, or grey, with or without alpha; if all its channels belong to one
-    /// layer, that layer's. `raw` takes integers as they are instead of decoding sRGB.
-    pub fn of(file: &ImageFile, path: &Path, raw: bool) -> Result<Self> {
+    /// layer, that layer's.
+    pub fn of(file: &ImageFile, path: &Path, integers: Integers) -> Result<Self> {
         let (order, is_xyz) = choose(&file.channels).ok_or_else(|| {
             let names = file.channels.join(", ");
             Error::io(path, format!("its colours cannot be told from the channels {names}; give it R, G and B, or Y"))
@@ -64,11 +79,11 @@ impl ColorChannels {
         let own = || file.attribute("chromaticities").and_then(|text| primaries(&text));
         let is_grey = order[0] == order[1];
         let to_rec709 = if is_xyz { Some(FROM_XYZ) } else { own().filter(|_| !is_grey && file.format == "openexr") };
-        Ok(Self { order, decoding: order.map(|channel| decoding(file, channel, raw)), to_rec709 })
+        Ok(Self { order, decoding: order.map(|channel| decoding(file, channel, integers)), to_rec709 })
     }
 
     /// A single channel by its name, as grey. Alpha is linear in every file.
-    pub fn single(file: &ImageFile, path: &Path, name: &str, raw: bool) -> Result<Self> {
+    pub fn single(file: &ImageFile, path: &Path, name: &str, integers: Integers) -> Result<Self> {
         let wanted = name.to_lowercase();
         let fits = |other: &String| {
             let other = other.to_lowercase();
@@ -79,7 +94,7 @@ impl ColorChannels {
             .iter()
             .position(fits)
             .ok_or_else(|| Error::io(path, format!("no channel `{name}` among {}", file.channels.join(", "))))?;
-        let decoding = decoding(file, channel, raw || wanted == "a");
+        let decoding = decoding(file, channel, if wanted == "a" { Integers::Raw } else { integers });
         Ok(Self { order: [channel; 3], decoding: [decoding; 3], to_rec709: None })
     }
 
@@ -101,14 +116,19 @@ impl ColorChannels {
 
     /// Whether each channel is eight bits of sRGB or of plain numbers, for tables of all values.
     pub fn is_eight_bit(&self, file: &ImageFile) -> bool {
-        file.is_eight_bit() && self.to_rec709.is_none() && self.decoding.iter().all(|d| *d == self.decoding[0])
+        let simple = |decoding: &Decoding| *decoding == self.decoding[0] && !matches!(decoding, Decoding::Gamma(_));
+        file.is_eight_bit() && self.to_rec709.is_none() && self.decoding.iter().all(simple)
     }
 }
 
-fn decoding(file: &ImageFile, channel: usize, raw: bool) -> Decoding {
+fn decoding(file: &ImageFile, channel: usize, integers: Integers) -> Decoding {
     match file.storage[channel] {
         Storage::Unsigned(_) if file.format == "openexr" => Decoding::Integer,
-        Storage::Unsigned(_) if !raw => Decoding::Srgb,
+        Storage::Unsigned(_) => match integers {
+            Integers::Srgb => Decoding::Srgb,
+            Integers::Raw => Decoding::Linear,
+            Integers::Gamma(gamma) => Decoding::Gamma(gamma),
+        },
         _ => Decoding::Linear,
     }
 }

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::Image;
-use super::channels::ColorChannels;
+use super::channels::{ColorChannels, Integers};
 use crate::error::{Error, Result};
 use crate::ffi::oiio;
 pub use crate::ffi::oiio::{
@@ -45,7 +45,7 @@ pub fn check_writable(path: &Path) -> Result<()> {
         return Ok(());
     }
     let formats = [LINEAR, ENCODED].concat().join(", ");
-    Err(Error::io(path, format!("the extension `{extension}` is not one of {formats}")))
+    Err(Error::Usage(format!("{}: the extension `{extension}` is not one of {formats}", path.display())))
 }
 
 /// Writes an image in the format of the path's extension, whole or not at all.
@@ -119,7 +119,7 @@ impl From<Image> for Picture {
 /// Reads the colours of an image file as linear RGB, and its alpha.
 pub fn read_picture(path: &Path) -> Result<Picture> {
     let file = ImageFile::open(path)?;
-    let colors = ColorChannels::of(&file, path, false)?;
+    let colors = ColorChannels::of(&file, path, Integers::Srgb)?;
     let at = colors.alpha(&file);
     // Display formats hold colours without their alpha.
     let multiplied = file.storage[colors.order[0]] == Storage::Float;

@@ -24,7 +24,7 @@ struct Node {
 const DOWN: u32 = 1 << 31;
 
 /// Corner and size of a cell, in pixels.
-type Place = [u32; 4];
+type CellRect = [u32; 4];
 
 /// A piecewise-constant density over the unit square.
 #[derive(Clone, Debug)]
@@ -32,7 +32,7 @@ pub struct Partition {
     size: [u32; 2],
     /// Cuts, from the whole image on.
     nodes: Vec<Node>,
-    cells: Vec<Place>,
+    cells: Vec<CellRect>,
     /// Running sums of the cells' weights as 32-bit shares of the total.
     sums: Vec<u32>,
     /// The cells that the starts of some equal parts of the total fall on, so that searches are short.
@@ -169,7 +169,7 @@ impl Partition {
             let node = cell.node;
             by_node[node] = Some(cell);
         });
-        let (mut places, mut sums, mut sum) = (Vec::new(), vec![0], 0.0);
+        let (mut rects, mut sums, mut sum) = (Vec::new(), vec![0], 0.0);
         let mut way = vec![0];
         while let Some(node) = way.pop() {
             let Node { children, .. } = nodes[node];
@@ -177,21 +177,21 @@ impl Partition {
                 way.extend([children as usize + 1, children as usize]);
                 continue;
             };
-            nodes[node].cut = places.len() as u32;
+            nodes[node].cut = rects.len() as u32;
             let (x, y) = (cell.columns, cell.rows);
-            places.push([x.start, y.start, x.end - x.start, y.end - y.start]);
+            rects.push([x.start, y.start, x.end - x.start, y.end - y.start]);
             sum += cell.weight;
             sums.push((sum / total * f64::from(u32::MAX)) as u32);
         }
         // The last sum is all there is, whatever rounding has made of it.
-        sums[places.len()] = u32::MAX;
-        let parts = places.len().div_ceil(PART);
+        sums[rects.len()] = u32::MAX;
+        let parts = rects.len().div_ceil(PART);
         let guide = (0..parts).map(|part| {
             let target = (part as f64 / parts as f64 * f64::from(u32::MAX)) as u32;
-            sums.partition_point(|&sum| sum <= target).saturating_sub(1).min(places.len() - 1) as u32
+            sums.partition_point(|&sum| sum <= target).saturating_sub(1).min(rects.len() - 1) as u32
         });
         let per_share = (f64::from(size[0]) * f64::from(size[1]) / f64::from(u32::MAX)) as f32;
-        Self { size, nodes, guide: guide.collect(), cells: places, sums, per_share }
+        Self { size, nodes, guide: guide.collect(), cells: rects, sums, per_share }
     }
 
     /// A point of the unit square and its density.

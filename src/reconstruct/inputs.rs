@@ -57,6 +57,18 @@ impl<'a> Inputs<'a> {
         self.frame.get(Layer::Alpha).map(|_| self.planes(Layer::Alpha, 1.0)).transpose()
     }
 
+    /// A filtered alpha, no further from the sampled one than its noise: what is opaque in every sample stays so.
+    pub fn clamp_alpha(&self, filtered: Image) -> Result<Image> {
+        let (sampled, variance) = (self.frame.require(Layer::Alpha)?, self.frame.require(Layer::AlphaVariance)?);
+        let near = |((value, sampled), variance): ((f32, &f32), &f32)| {
+            let most = 2.0 * variance.sqrt();
+            value.clamp(sampled - most, sampled + most).clamp(0.0, 1.0)
+        };
+        let (width, height, channels) = filtered.shape();
+        let data = filtered.data.into_iter().zip(&sampled.data).zip(&variance.data).map(near).collect();
+        Ok(Image { width, height, channels, data })
+    }
+
     /// Radiance and its variance.
     pub fn color(&self) -> Result<[Planes; 2]> {
         Ok([self.planes(Layer::Color, self.scale)?, self.planes(Layer::ColorVariance, self.scale * self.scale)?])

@@ -69,7 +69,8 @@ impl Reconstruction for Nlm {
         let values = alpha.as_ref().map(|alpha| guides.color.mean.clone().and(alpha));
         let filtered = nl_means::filter(values.as_ref().unwrap_or(&guides.color.mean), &guides, settings);
         let image = filtered.part(0, 3).to_image(frame.width, frame.height, 1.0 / inputs.scale);
-        let alpha = alpha.map(|_| filtered.part(3, 1).to_image(frame.width, frame.height, 1.0));
+        let alpha = alpha.map(|_| inputs.clamp_alpha(filtered.part(3, 1).to_image(frame.width, frame.height, 1.0)));
+        let alpha = alpha.transpose()?;
         Ok(Solution { image, alpha, error: None, notes: Vec::new() })
     }
 }

@@ -57,6 +57,10 @@ impl PathRecord {
                 self.samples[id].direct = if hidden { Rgb::ZERO } else { found.radiance };
                 continue;
             }
+            // Through holes the camera sees the environment as it sees it beside them.
+            if scene.integrator().hide_emitters && !hit.get(lane) && self.samples[id].alpha == 0.0 {
+                continue;
+            }
             self.samples[id].color += found.color;
             self.lit_length[id] = depth;
             if let Some(level) = recorded {

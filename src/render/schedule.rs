@@ -187,7 +187,7 @@ fn run_tiles(
             return;
         }
         let before = tile.samples();
-        if let Some(rejected) = run_tile(settings, wave, tile, goals) {
+        if let Some(rejected) = run_tile(settings, wave, tile, (goals, control.stop)) {
             let mut first = first_rejected.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
             first.get_or_insert(rejected);
         }
@@ -204,7 +204,16 @@ fn run_tiles(
     due.into_inner()
 }
 
-fn run_tile(settings: RenderSettings, wave: &mut Wave, tile: &mut Tile, goals: Goals) -> Option<(SampleId, Rejected)> {
+/// Samples of a tile's pixels after which it ends early where that is asked for: as many as are soon done.
+const SOON: u32 = 256;
+
+/// Takes the samples that the pixels of a tile lack. Returns the first that was rejected.
+fn run_tile(
+    settings: RenderSettings,
+    wave: &mut Wave,
+    tile: &mut Tile,
+    (goals, stop): (Goals, &AtomicBool),
+) -> Option<(SampleId, Rejected)> {
     let mut first_rejected = None;
     // Samples of one number are traced together, whatever number a pixel starts with.
     let spans: Vec<_> = (0..tile.width * tile.height)
@@ -216,7 +225,11 @@ fn run_tile(settings: RenderSettings, wave: &mut Wave, tile: &mut Tile, goals: G
     let due = || spans.iter().filter(|span| !span.is_empty());
     let (start, end) = (due().map(|span| span.start).min(), due().map(|span| span.end).max());
     let (mut numbers, mut pixels) = (Vec::new(), Vec::new());
-    for index in start.unwrap_or(0)..end.unwrap_or(0) {
+    let start = start.unwrap_or(0);
+    for index in start..end.unwrap_or(0) {
+        if index - start >= SOON && stop.load(Ordering::Relaxed) {
+            break;
+        }
         numbers.clear();
         numbers.extend((0..spans.len()).filter(|&pixel| spans[pixel].contains(&index)));
         pixels.clear();

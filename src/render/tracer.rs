@@ -76,7 +76,7 @@ impl<'a> PathTracer<'a> {
             }
             let shaded = shade((scene, &sampler), depth, packet, vertices, (k * LANES) as u32, next);
             record.add_direct(depth, vertices, &shaded);
-            if needs.alpha {
+            if needs.alpha || scene.integrator().hide_emitters {
                 record.cover(packet, vertices.hit & !vertices.passed);
             }
             if describes(*needs) || needs.ambient {
@@ -101,9 +101,9 @@ fn arrive(
     (vertices, recorded): (&mut Vertices, Option<usize>),
     record: &mut PathRecord,
 ) {
-    let Integrator { max_depth, hide_emitters, .. } = scene.integrator();
+    let Integrator { max_depth, hide_emitters, pass_emitters, .. } = scene.integrator();
     let mut hit = scene.intersect_packet(&packet.rays, active, depth == 0, &mut vertices.surfaces);
-    if depth == 0 && hide_emitters {
+    if depth == 0 && pass_emitters {
         scene.pass_emitters(&packet.rays, &mut hit, &mut vertices.surfaces);
     }
     if max_depth > 0 {

@@ -53,13 +53,15 @@ pub struct Integrator {
     pub max_depth: u32,
     /// Number of scattering events after which Russian roulette begins.
     pub rr_depth: u32,
-    /// Whether the camera looks through emitters as if they were not there.
+    /// Whether emitters that the camera sees are black.
     pub hide_emitters: bool,
+    /// Whether, besides, the camera looks through shapes that emit as if they were not there.
+    pub pass_emitters: bool,
 }
 
 impl Default for Integrator {
     fn default() -> Self {
-        Self { max_depth: u32::MAX, rr_depth: 5, hide_emitters: false }
+        Self { max_depth: u32::MAX, rr_depth: 5, hide_emitters: false, pass_emitters: false }
     }
 }
 
@@ -175,7 +177,7 @@ impl Scene {
     pub fn intersect_from_camera(&self, mut ray: Ray) -> Option<Surface> {
         loop {
             let surface = self.intersect(ray)?;
-            if !self.integrator.hide_emitters || self.shapes[surface.at.shape as usize].emitter.is_none() {
+            if !self.integrator.pass_emitters || self.shapes[surface.at.shape as usize].emitter.is_none() {
                 return Some(surface);
             }
             let origin = surface.leave(ray.direction);

@@ -145,7 +145,7 @@ fn mistakes_are_told_apart_and_leave_nothing_behind() {
     for (arguments, code, expected) in [
         (vec!["render", "no.xml", "-o", "a.exr"], 1, "no.xml"),
         (vec!["render", "bad.xml", "-o", "a.exr"], 1, "bad.xml:2: shape `teapot` is not known; there are obj"),
-        (vec!["render", &cornell, "-o", "a.tiff8"], 1, "not one of exr"),
+        (vec!["render", &cornell, "-o", "a.tiff8"], 2, "not one of exr"),
         (vec!["render", &cornell, "-o", "no/folder/a.exr"], 1, "cannot be written"),
         (vec!["render", &cornell, "-o", "a.exr", "--method", "magic"], 2, "there are primal, l2"),
         (vec!["render", &cornell, "-o", "a.exr", "--size", "0x5"], 2, "positive"),

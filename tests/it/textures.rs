@@ -288,6 +288,24 @@ fn channels_that_are_no_colour_are_refused_or_chosen_by_name() {
 }
 
 #[test]
+fn a_gamma_of_the_file_is_decoded_everywhere() {
+    let gamma = |value: f32| format!("<float name=\"gamma\" value=\"{value}\"/>");
+    for depth in [png::BitDepth::Eight, png::BitDepth::Sixteen] {
+        let (image, share) = match depth {
+            png::BitDepth::Eight => (png(depth, &[128], ""), 128.0 / 255.0),
+            _ => (png(depth, &[32769], ""), 0.5f32),
+        };
+        for (value, expected) in [(1.0, share), (1.8, share.powf(1.8)), (3.0, share.powf(3.0))] {
+            for around in [false, true] {
+                let scene = view("a.png", &image, false, around, &gamma(value)).unwrap();
+                near(color(&scene), [expected; 3], &format!("gamma {value}, around {around}"));
+            }
+        }
+    }
+    assert!(view("a.png", &png(png::BitDepth::Eight, &[9], ""), false, false, &gamma(-2.0)).is_err());
+}
+
+#[test]
 fn texels_that_are_not_finite_are_counted_and_a_clipped_sun_is_bright() {
     for (value, expected) in [(f32::INFINITY, 65504.0), (f32::NAN, 0.0), (f32::NEG_INFINITY, 0.0)] {
         for kind in [Kind::Half, Kind::Float] {

@@ -396,12 +396,114 @@ fn any_sensor_can_be_chosen_and_none_is_needed_to_look_at_a_scene() {
         assert_eq!(choose(sensor).unwrap().sensor().width, width, "{sensor:?}");
     }
     let message = choose(Some("near")).err().unwrap().to_string();
-    assert!(message.contains("has no sensor `near`; there are 0, 1 (`far`)"), "{message}");
+    assert!(message.contains("has no sensor `near`; it has numbers 0, 1 (`far`)"), "{message}");
     assert_ne!(choose(None).unwrap().fingerprint(), choose(Some("far")).unwrap().fingerprint());
     let bare = format!("<scene version=\"3.0.0\">{BALL}</scene>");
     assert!(try_text(&bare).is_err());
     let options = load::Options { sensor_optional: true, ..load::Options::default() };
     assert_eq!(scene_of(&[("scene.xml", bare.as_bytes())], &options).unwrap().sensors().len(), 0);
+}
+
+#[test]
+fn included_files_find_what_lies_beside_them() {
+    let flat = |value: &str| format!("400:{value}\n700:{value}\n").replace(':', " ");
+    let lamp = "<scene version=\"3.0.0\"><emitter type=\"constant\"><spectrum name=\"radiance\" filename=\"s.spd\"/></emitter></scene>";
+    let of = |main: &str, files: &[(&str, String)]| {
+        let main = file("3.0.0", main);
+        let mut all: Vec<(&str, &[u8])> = files.iter().map(|(name, text)| (*name, text.as_bytes())).collect();
+        all.push(("scene.xml", main.as_bytes()));
+        centre_and_corner(&scene_of(&all, &load::Options::default()).unwrap()).0[0]
+    };
+    let lamp = lamp.to_owned();
+    let one = of("<include filename=\"parts/l.xml\"/>", &[("parts/l.xml", lamp.clone()), ("s.spd", flat("1"))]);
+    // The file that includes comes first, then the folders of paths.
+    let files = [("l.xml", lamp.clone()), ("s.spd", flat("1")), ("a/s.spd", flat("2"))];
+    assert_eq!(of("<path value=\"a\"/><include filename=\"l.xml\"/>", &files), one);
+    let nested = "<scene version=\"3.0.0\"><include filename=\"l.xml\"/></scene>".to_owned();
+    let files = [("parts/n.xml", nested), ("parts/l.xml", lamp.clone()), ("parts/s.spd", flat("1"))];
+    assert_eq!(of("<include filename=\"parts/n.xml\"/>", &files), one);
+    // A path of an included file is that file's own.
+    let own = "<scene version=\"3.0.0\"><path value=\"a\"/></scene>".to_owned();
+    let here = format!(
+        "<include filename=\"p.xml\"/>{}",
+        lamp.replace("<scene version=\"3.0.0\">", "").replace("</scene>", "")
+    );
+    assert_eq!(of(&here, &[("p.xml", own), ("s.spd", flat("1")), ("a/s.spd", flat("2"))]), one);
+}
+
+/// The sky is hidden behind holes as it is beside them, and what is hit through them is not.
+#[test]
+fn hidden_environments_are_hidden_behind_holes_too() {
+    let hidden = "<integrator type=\"path\"><boolean name=\"hide_emitters\" value=\"true\"/></integrator>";
+    let holes = "<bsdf type=\"mask\"><float name=\"opacity\" value=\"0.3\"/><bsdf type=\"twosided\"><bsdf type=\"diffuse\"/></bsdf></bsdf>";
+    for (material, color, alpha) in
+        [(holes, 0.15, 0.3), ("<bsdf type=\"null\"/>", 0.0, 0.0), ("<bsdf type=\"diffuse\"/>", 0.5, 1.0)]
+    {
+        let body = format!(
+            "{hidden}<shape type=\"rectangle\"><transform name=\"to_world\"><scale value=\"9\"/></transform>{material}</shape>\
+            <emitter type=\"constant\"/>"
+        );
+        let frame = film(&text(&file("3.0.0", &body)), 256, 1, Needs { alpha: true, ..Needs::default() }).develop();
+        let mean = |layer| {
+            let image = frame.get(layer).unwrap();
+            image.data.iter().sum::<f32>() / image.data.len() as f32
+        };
+        let found = (mean(Layer::Color) + mean(Layer::Direct), mean(Layer::Alpha));
+        assert!((found.0 - color).abs() < 0.01 && (found.1 - alpha).abs() < 0.01, "{material}: {found:?}");
+    }
+    // In files of version 0.6 a hidden lamp is black, and still in the way.
+    let lamp = "<integrator type=\"path\"><boolean name=\"hideEmitters\" value=\"true\"/></integrator><shape type=\"sphere\"><emitter \
+        type=\"area\"/></shape><shape type=\"rectangle\"><transform name=\"toWorld\"><scale value=\"9\"/><translate z=\"-2\"/>\
+        </transform></shape>";
+    assert_eq!(centre_and_corner(&text(&file("0.6.0", lamp))).0, [0.0; 3]);
+    let through = lamp.replace("hideEmitters", "hide_emitters").replace("toWorld", "to_world");
+    assert!(centre_and_corner(&text(&file("3.0.0", &through))).0[0] > 0.0);
+}
+
+#[test]
+fn values_are_taken_as_files_write_them_or_refused_with_a_reason() {
+    let ball = |inside: &str| format!("<shape type=\"sphere\">{inside}</shape><emitter type=\"constant\"/>");
+    let warns = |body: &str, expected: &str| {
+        let scene = text(&file("3.0.0", body));
+        assert!(scene.warnings().iter().any(|warning| warning.contains(expected)), "{body}: {:?}", scene.warnings());
+    };
+    text(&file(
+        "3.0.0",
+        &ball(
+            "<point name=\"center\" value=\"0.1\"/><bsdf type=\"roughconductor\"><string name=\"distribution\" value=\"GGX\"/></bsdf>",
+        ),
+    ));
+    text(&file(
+        "3.0.0",
+        &format!(
+            "<integrator type=\"moment\"><integrator type=\"aov\"><integrator type=\"path\"/></integrator></integrator>{BALL}"
+        ),
+    ));
+    text(&file(
+        "3.0.0",
+        &format!("<integrator type=\"path\" id=\"p\"/><integrator type=\"moment\"><ref id=\"p\"/></integrator>{BALL}"),
+    ));
+    warns(
+        &ball("<bsdf type=\"diffuse\"><rgb name=\"reflectance\" value=\"2 1 0.5\"/></bsdf>"),
+        "`reflectance` is more than one: it is scaled by 0.495",
+    );
+    for (body, expected) in [
+        (
+            ball("<bsdf type=\"diffuse\"><rgb name=\"reflectance\" value=\"-0.5 1 0\"/></bsdf>"),
+            "light cannot be less than none",
+        ),
+        ("<integrator type=\"path\"/><integrator type=\"direct\"/>".into(), "a second integrator"),
+        ("<integrator type=\"path\"><integer name=\"max_depth\" value=\"-2\"/></integrator>".into(), "or -1 for any"),
+    ] {
+        let message = try_text(&file("3.0.0", &body)).err().unwrap().to_string();
+        assert!(message.contains(expected), "{message}");
+    }
+    let empty = file("3.0.0", "<shape type=\"obj\"><string name=\"filename\" value=\"m.obj\"/></shape>");
+    let scene =
+        scene_of(&[("m.obj", b"no mesh\n"), ("scene.xml", empty.as_bytes())], &load::Options::default()).unwrap();
+    assert!(scene.warnings()[0].contains("the obj file has no faces"), "{:?}", scene.warnings());
+    let mean = covered("m.obj", b"v -1 -1 0\rv 1 -1 0\rv 1 1 0\rf 1 2 3\r");
+    assert!((mean - 0.5).abs() < 0.01, "lines of old Macs: {mean}");
 }
 
 /// Examples that are kept outside of the repository, if they are there.

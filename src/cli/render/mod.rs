@@ -54,7 +54,7 @@ pub struct Args {
     #[command(flatten)]
     checkpoint: checkpoint::Args,
     /// Threads to work with (0: one per core)
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, value_parser = super::parse_threads)]
     threads: usize,
     #[command(flatten)]
     options: super::scene::Args,

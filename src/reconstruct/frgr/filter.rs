@@ -57,8 +57,6 @@ pub struct FilterProblem<'a> {
     pub variance: &'a Planes,
     /// Cost of a squared weight.
     pub penalty: &'a Planes,
-    /// A plane that is filtered along with the colour.
-    pub carried: Option<&'a Planes>,
     /// One to [`TERMS`] terms of the objective.
     pub terms: Vec<Term<'a>>,
     /// Radius of the window.
@@ -67,30 +65,14 @@ pub struct FilterProblem<'a> {
     pub solver: Solver,
 }
 
-/// The result of a filter.
-pub struct Filtered {
-    /// The colour.
-    pub color: Planes,
-    /// Its variance.
-    pub variance: Planes,
-    /// The plane that was filtered along with it.
-    pub carried: Option<Planes>,
-}
-
 impl FilterProblem<'_> {
-    /// The filtered colour, its variance and what is carried along.
-    pub fn solve(&self) -> Filtered {
-        let planes =
-            Planes::from_tiles(self.color.width, self.color.height, self.channels(), |tile| match self.solver {
-                Solver::Sweeps => sweep_tile(self, tile),
-                Solver::Exact => exact_tile(self, tile),
-            });
-        let carried = self.carried.map(|_| planes.part(6, 1));
-        Filtered { color: planes.part(0, 3), variance: planes.part(3, 3), carried }
-    }
-
-    fn channels(&self) -> usize {
-        6 + usize::from(self.carried.is_some())
+    /// The filtered colour and its variance.
+    pub fn solve(&self) -> [Planes; 2] {
+        let planes = Planes::from_tiles(self.color.width, self.color.height, 6, |tile| match self.solver {
+            Solver::Sweeps => sweep_tile(self, tile),
+            Solver::Exact => exact_tile(self, tile),
+        });
+        [planes.part(0, 3), planes.part(3, 3)]
     }
 
     /// Pixels of the window around one.
@@ -103,7 +85,7 @@ impl FilterProblem<'_> {
 
 fn exact_tile(problem: &FilterProblem, tile: PlaneTile) -> Vec<f32> {
     let pixels = tile.width * tile.height;
-    let mut out = vec![0.0; problem.channels() * pixels];
+    let mut out = vec![0.0; 6 * pixels];
     let size = (2 * problem.radius + 1).pow(2);
     let (mut vectors, mut penalties, mut weights) = (vec![[0.0; RANK]; size], vec![0.0; size], vec![0.0; size]);
     for i in 0..pixels {
@@ -127,11 +109,6 @@ fn exact_tile(problem: &FilterProblem, tile: PlaneTile) -> Vec<f32> {
             }
             (out[c * pixels + i], out[(3 + c) * pixels + i]) = (mean as f32, variance as f32);
         }
-        if let Some(carried) = problem.carried {
-            let pairs = weights.iter().zip(problem.window(at));
-            out[6 * pixels + i] =
-                pairs.map(|(weight, q)| weight * f64::from(carried.at(0, q.0, q.1))).sum::<f64>() as f32;
-        }
     }
     out
 }
@@ -141,7 +118,7 @@ fn exact_tile(problem: &FilterProblem, tile: PlaneTile) -> Vec<f32> {
     multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))
 )]
 fn sweep_tile(problem: &FilterProblem, tile: PlaneTile) -> Vec<f32> {
-    let mut out = vec![0.0; problem.channels() * tile.width * tile.height];
+    let mut out = vec![0.0; 6 * tile.width * tile.height];
     let mut weights = vec![Lanes::ZERO; (2 * problem.radius + 1).pow(2)];
     for (x, y) in tile.blocks() {
         let at = ((tile.x + x) as isize, (tile.y + y) as isize);
@@ -153,8 +130,7 @@ fn sweep_tile(problem: &FilterProblem, tile: PlaneTile) -> Vec<f32> {
             4 => Sweeps::<4>::new(problem, at, &mut weights).run(),
             _ => Sweeps::<TERMS>::new(problem, at, &mut weights).run(),
         };
-        let planes = planes.into_iter().enumerate().take(problem.channels());
-        planes.for_each(|(c, values)| tile.put(&mut out, c, x, y, values));
+        planes.into_iter().enumerate().for_each(|(c, values)| tile.put(&mut out, c, x, y, values));
     }
     out
 }
@@ -185,24 +161,19 @@ impl<'a, const T: usize> Sweeps<'a, T> {
     }
 
     #[inline(always)]
-    fn run(mut self) -> [Lanes; 7] {
+    fn run(mut self) -> [Lanes; 6] {
         self.start();
         for _ in 0..SWEEPS {
             self.sweep();
         }
         let total = self.weights.iter().fold(Lanes::ZERO, |sum, weight| sum + *weight);
         let share = Lanes::splat(1.0) / total;
-        let mut result = [Lanes::ZERO; 7];
+        let mut result = [Lanes::ZERO; 6];
         for (weight, q) in self.weights.iter().zip(self.problem.window(self.at)) {
             let weight = *weight * share;
             for c in 0..3 {
                 result[c] += weight * self.problem.color.lanes(c, q.0, q.1);
                 result[3 + c] += weight * weight * self.problem.variance.lanes(c, q.0, q.1);
-            }
-        }
-        if let Some(carried) = self.problem.carried {
-            for (weight, q) in self.weights.iter().zip(self.problem.window(self.at)) {
-                result[6] += *weight * share * carried.lanes(0, q.0, q.1);
             }
         }
         result

@@ -21,7 +21,7 @@ mod resample;
 use std::borrow::Cow;
 
 use self::enhance::{Enhanced, enhance};
-use self::filter::{FilterProblem, Filtered, Solver, Term};
+use self::filter::{FilterProblem, Solver, Term};
 use self::form::Form;
 use self::level::Level;
 use self::resample::Resampling;
@@ -144,17 +144,15 @@ impl Reconstruction for Frgr {
             let enhanced = self.enhance(&this, inputs.spp);
             notes.add(&format!("level{k}_enhanced"), &enhanced.image, inputs.scale);
             (context.progress)("filter", 1.0 - 0.5 * left);
-            let alpha = if k == 0 { inputs.alpha()? } else { None };
-            let filtered = self.filter((&this, alpha.as_ref()), &enhanced.image, upper.as_ref(), inputs.spp);
-            notes.add(&format!("level{k}_filtered"), &filtered.color, inputs.scale);
+            let filtered = self.filter(&this, &enhanced.image, upper.as_ref(), inputs.spp);
+            notes.add(&format!("level{k}_filtered"), &filtered[0], inputs.scale);
             if k == 0 {
-                let image = filtered.color.to_image(frame.width, frame.height, 1.0 / inputs.scale);
+                let image = filtered[0].to_image(frame.width, frame.height, 1.0 / inputs.scale);
                 let error = error_image(&this, &enhanced, &inputs, frame);
-                let alpha = filtered.carried.map(|alpha| alpha.to_image(frame.width, frame.height, 1.0));
-                return Ok(Solution { image, alpha, error: Some(error), notes: notes.notes });
+                return Ok(Solution { image, alpha: None, error: Some(error), notes: notes.notes });
             }
-            let Filtered { color, variance, .. } = filtered;
-            upper = Some([choices[k - 1].up(&color), choices[k - 1].up_variance(&variance.sum())]);
+            let [image, variance] = filtered;
+            upper = Some([choices[k - 1].up(&image), choices[k - 1].up_variance(&variance.sum())]);
         }
         unreachable!("there is a level 0")
     }
@@ -235,15 +233,8 @@ impl Frgr {
         Enhanced { image, error: None }
     }
 
-    /// The filtered colour and its variance. `upper` is the result of the coarser level and the sum of its variances;
-    /// `carried` is filtered along.
-    fn filter(
-        &self,
-        (this, carried): (&Prepared, Option<&Planes>),
-        guide: &Planes,
-        upper: Option<&[Planes; 2]>,
-        spp: f32,
-    ) -> Filtered {
+    /// The filtered colour and its variance. `upper` is the result of the coarser level and the sum of its variances.
+    fn filter(&self, this: &Prepared, guide: &Planes, upper: Option<&[Planes; 2]>, spp: f32) -> [Planes; 2] {
         let Prepared { level, denoised, .. } = this;
         let weights = self.form.weights(spp);
         let mut terms = vec![Term { value: Cow::Borrowed(guide), target: guide, weight: 1.0 }];
@@ -273,8 +264,7 @@ impl Frgr {
             }
         }
         let (color, variance) = (&level.color, &level.variance);
-        let (radius, solver) = (self.radius, self.solver);
-        FilterProblem { color, variance, penalty: &penalty, carried, terms, radius, solver }.solve()
+        FilterProblem { color, variance, penalty: &penalty, terms, radius: self.radius, solver: self.solver }.solve()
     }
 }
 

@@ -111,19 +111,21 @@ fn error(halves: &[Planes; 2], filtered: &[Planes; 2], variance: &Planes) -> Pla
     sum.zip(&gain, |sum, gain| sum - 0.25 * gain).zip(variance, |error, variance| error - 2.0 * variance)
 }
 
-/// Albedo, normal and depth, each filtered by itself, the depth in units of the largest.
+/// Albedo, normal and depth, each filtered by itself, the depth in units of the largest. Frames of other programs may have
+/// no depth.
 fn features(inputs: &Inputs) -> Result<Planes> {
-    let furthest = inputs.frame.require(Layer::Depth)?.data.iter().copied().fold(1e-30, f32::max);
+    let depth = inputs.frame.get(Layer::Depth);
+    let furthest = depth.map_or(0.0, |depth| depth.data.iter().copied().fold(1e-30, f32::max));
     let layers = [
         (Layer::Albedo, Layer::AlbedoVariance, 1.0),
         (Layer::Normal, Layer::NormalVariance, 1.0),
         (Layer::Depth, Layer::DepthVariance, 1.0 / furthest),
     ];
     let mut all: Option<Planes> = None;
-    for (mean, variance, scale) in layers {
+    for (mean, variance, scale) in layers.into_iter().take(if depth.is_some() { 3 } else { 2 }) {
         let (mean, variance) = (inputs.planes(mean, scale)?, inputs.planes(variance, scale * scale)?.sum());
         let clean = nl_means::clean(&Guide { mean, variance, tolerance: None }, 0.5);
         all = Some(all.map_or_else(|| clean.clone(), |all| all.and(&clean)));
     }
-    Ok(all.expect("there are three"))
+    Ok(all.expect("there are two"))
 }

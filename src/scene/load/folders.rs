@@ -4,40 +4,70 @@ use std::path::{Path, PathBuf};
 
 /// Folders in the order that they are looked into.
 #[derive(Clone, Debug, Default)]
-pub struct Folders(Vec<PathBuf>);
+pub struct Folders {
+    folders: Vec<PathBuf>,
+    /// Folders of included files, which are looked into last.
+    included: Vec<PathBuf>,
+}
 
 impl Folders {
     /// The folder of a scene file, then the current one.
     pub fn of_scene(path: &Path) -> Self {
-        Self(vec![path.parent().unwrap_or(Path::new("")).to_path_buf(), PathBuf::new()])
+        Self { folders: vec![folder_of(path), PathBuf::new()], included: Vec::new() }
     }
 
     /// Adds a folder that comes before all others.
     pub fn prepend(&mut self, folder: PathBuf) {
-        self.0.insert(0, folder);
+        self.folders.insert(0, folder);
+    }
+
+    /// The folders while a file is read that `including` includes: its own first.
+    pub fn for_included(&self, including: &Path) -> Self {
+        let mut folders = self.clone();
+        folders.prepend(folder_of(including));
+        folders
+    }
+
+    /// Keeps folders that only an included file has named, for the files that are left to be found.
+    pub fn remember(&mut self, inner: Self) {
+        let all = inner.folders.into_iter().chain(inner.included);
+        let mut new: Vec<_> = all.filter(|folder| !self.folders.contains(folder)).collect();
+        new.retain(|folder| !self.included.contains(folder));
+        self.included.append(&mut new);
+    }
+
+    fn all(&self) -> impl Iterator<Item = &PathBuf> {
+        self.folders.iter().chain(&self.included)
     }
 
     /// The first file or folder of this name.
     pub fn find(&self, name: &str) -> Option<PathBuf> {
-        self.0.iter().map(|folder| folder.join(name)).find(|path| path.exists())
+        self.all().map(|folder| folder.join(name)).find(|path| path.exists())
     }
 
     /// The first plain file of this name.
     pub fn find_file(&self, name: &str) -> Option<PathBuf> {
-        self.0.iter().map(|folder| folder.join(name)).find(|path| path.is_file())
+        self.all().map(|folder| folder.join(name)).find(|path| path.is_file())
     }
 
     /// The message that there is no file `name`, with the one that is probably meant.
     pub fn missing(&self, name: &str) -> String {
-        let mut folders: Vec<_> = self.0.iter().map(|folder| folder.display().to_string()).collect();
+        let mut folders: Vec<_> = self.folders.iter().map(|folder| folder.display().to_string()).collect();
         folders.iter_mut().filter(|folder| folder.is_empty()).for_each(|folder| *folder = ".".into());
         folders.dedup();
         let what = format!("no file `{name}` in {}", folders.join(" or "));
-        match self.0.iter().find_map(|folder| similar(folder, name)) {
+        if self.find(name).is_some() {
+            return format!("`{name}` is a folder, not a file");
+        }
+        match self.all().find_map(|folder| similar(folder, name)) {
             Some(path) => format!("{what}; there is `{}`: write its name so", path.display()),
             None => what,
         }
     }
+}
+
+fn folder_of(path: &Path) -> PathBuf {
+    path.parent().unwrap_or(Path::new("")).to_path_buf()
 }
 
 /// The file that a name with other slashes or in other case stands for, as on the systems that do not tell them apart.

@@ -1,5 +1,7 @@
 //! Integrators of scene files. All of them are path traced, with their path depths.
 
+use std::rc::Rc;
+
 use super::Loader;
 use super::props::Object;
 use crate::error::Result;
@@ -24,12 +26,28 @@ const PATH_TRACERS: &[&str] =
 const SCHEDULING: &[&str] =
     &["samples_per_pass", "timeout", "block_size", "emitter_samples", "bsdf_samples", "shading_samples", "aovs"];
 
+/// Path depths of a scene: of its one integrator that no other one refers to.
+pub fn choose(integrators: &[&Rc<Object>], loader: &mut Loader) -> Result<Integrator> {
+    let mut inner: Vec<*const Object> = Vec::new();
+    for property in integrators.iter().flat_map(|integrator| integrator.nested()) {
+        inner.push(Rc::as_ptr(&loader.resolve(property)?));
+    }
+    let mut outer = integrators.iter().filter(|integrator| !inner.contains(&Rc::as_ptr(integrator)));
+    match (outer.next(), outer.next()) {
+        (_, Some(second)) => Err(second.loc.invalid("a second integrator; a scene has one")),
+        (Some(only), None) => load(only, loader),
+        // Two that refer to each other, or none.
+        (None, None) => integrators.first().map_or(Ok(Integrator::default()), |first| load(first, loader)),
+    }
+}
+
 /// Path depths from an integrator.
 pub fn load(object: &Object, loader: &mut Loader) -> Result<Integrator> {
     let plugin = object.plugin.as_str();
     object.ignore(SCHEDULING);
     let wrapped = wrapped(object, loader)?;
     if ["moment", "aov"].contains(&plugin) {
+        object.ignore(&["keep_emitters"]);
         loader.warn_unused(object)?;
         return Ok(wrapped.unwrap_or_default());
     }
@@ -73,9 +91,15 @@ fn wrapped(object: &Object, loader: &mut Loader) -> Result<Option<Integrator>> {
 fn path(object: &Object) -> Result<Integrator> {
     let defaults = Integrator::default();
     let depth = object.integer("max_depth", -1)?;
+    if depth < -1 {
+        return Err(object.loc_of("max_depth").invalid("`max_depth` is a number of edges, or -1 for any"));
+    }
     let max_depth = if depth < 0 { u32::MAX } else { u32::try_from(depth).unwrap_or(u32::MAX) };
     let rr_depth = object.integer("rr_depth", i64::from(defaults.rr_depth))?;
     let rr_depth = u32::try_from(rr_depth).ok().filter(|&depth| depth > 0);
+    let hide_emitters = object.boolean("hide_emitters", false)?;
+    // In files of version 0.6 hidden emitters are still in the way.
+    let pass_emitters = !object.boolean("keep_emitters", false)? && hide_emitters;
     let rr_depth = rr_depth.ok_or_else(|| object.loc_of("rr_depth").invalid("`rr_depth` must be at least 1"))?;
-    Ok(Integrator { max_depth, rr_depth, hide_emitters: object.boolean("hide_emitters", false)? })
+    Ok(Integrator { max_depth, rr_depth, hide_emitters, pass_emitters })
 }

@@ -44,7 +44,11 @@ impl Legacy<'_> {
                 self.push("material", Value::String("Cu".into()));
             }
             ("texture", "bitmap") => self.bitmap(),
-            ("emitter", "envmap") => self.remove(&["cache", "gamma"]),
+            ("emitter", "envmap") => {
+                self.remove(&["cache"]);
+                self.gamma();
+            }
+            ("integrator", _) => self.push("keep_emitters", Value::Boolean(true)),
             ("emitter", "sun" | "sky" | "sunsky") => self.push("convention", Value::String("0.6".into())),
             _ => {}
         }
@@ -78,8 +82,7 @@ impl Legacy<'_> {
         }
     }
 
-    /// Filters are for camera rays that know their footprint, which a pixel's samples average over; a gamma of one means
-    /// plain numbers, any other one colours for a display.
+    /// Filters are for camera rays that know their footprint, which a pixel's samples average over.
     fn bitmap(&mut self) {
         let smooth =
             |value: &Value| matches!(value, Value::String(name) if ["trilinear", "ewa"].contains(&name.as_str()));
@@ -88,10 +91,15 @@ impl Legacy<'_> {
                 property.value = Value::String("bilinear".into());
             }
         }
-        if self.number("gamma") == Some(1.0) {
-            self.push("raw", Value::Boolean(true));
+        self.remove(&["cache", "max_anisotropy"]);
+        self.gamma();
+    }
+
+    /// Zero and -1 stand for the file's own.
+    fn gamma(&mut self) {
+        if self.number("gamma").is_some_and(|gamma| gamma <= 0.0) {
+            self.remove(&["gamma"]);
         }
-        self.remove(&["gamma", "cache", "max_anisotropy"]);
     }
 
     /// Gathers the scale and offset of textures in `to_uv`.

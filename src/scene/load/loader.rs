@@ -26,7 +26,7 @@ pub struct Loader {
     /// Objects that have been built, with the number of objects that each is made of.
     bsdfs: HashMap<*const Object, (Arc<dyn Bsdf>, usize)>,
     textures: HashMap<*const Object, (Arc<dyn Texture>, usize)>,
-    bitmaps: HashMap<(PathBuf, texture::Selection), Arc<texture::Texels>>,
+    bitmaps: HashMap<PathBuf, Vec<(texture::Selection, Arc<texture::Texels>)>>,
     texture_memory: texture::Memory,
     meshes: HashMap<PathBuf, Vec<u8>>,
     /// Every file that a property names.
@@ -170,8 +170,26 @@ impl Loader {
                 let nested = self.resolve(property)?;
                 self.texture_object(&nested)
             }
-            _ => Ok(Arc::new(texture::Constant(object.color(name, default)?))),
+            _ => Ok(Arc::new(texture::Constant(self.color(object, name, default)?))),
         }
+    }
+
+    /// The property `name` as a colour. A reflectance is none below zero, and above one is made so with a warning.
+    fn color(&self, object: &Object, name: &str, default: Rgb) -> Result<Rgb> {
+        let color = object.color(name, default)?;
+        let is_share = name.ends_with("reflectance") || name.ends_with("transmittance") || name == "base_color";
+        if object.class != "bsdf" || !is_share {
+            return Ok(color);
+        }
+        if color.min_element() < 0.0 {
+            return Err(object.loc_of(name).invalid(format!("`{name}` is {color}: light cannot be less than none")));
+        }
+        let largest = color.max_element();
+        if largest <= 1.0 {
+            return Ok(color);
+        }
+        self.warn(&object.loc_of(name), format!("`{name}` is more than one: it is scaled by {:.3}", 0.99 / largest))?;
+        Ok(color * (0.99 / largest))
     }
 
     /// The property `name` as emitted light, white when absent.
@@ -226,17 +244,18 @@ impl Loader {
 
     /// The texels of the image file that an object names, each selection read once.
     pub fn texels(&mut self, object: &Object, selection: texture::Selection) -> Result<Arc<texture::Texels>> {
-        let key = (self.file(object)?, selection);
-        if let Some(texels) = self.bitmaps.get(&key) {
+        let path = self.file(object)?;
+        let read = self.bitmaps.entry(path.clone()).or_default();
+        if let Some((_, texels)) = read.iter().find(|(known, _)| *known == selection) {
             return Ok(Arc::clone(texels));
         }
-        let (texels, infinite) = texture::Texels::read(&key.0, &key.1, &mut self.texture_memory)?;
+        let (texels, infinite) = texture::Texels::read(&path, &selection, &mut self.texture_memory)?;
         if infinite > 0 {
             let what = format!("{infinite} texels are not finite: infinity counts as 65504, what is no number as zero");
-            self.warn(&SourceLoc::file(&key.0), what)?;
+            self.warn(&SourceLoc::file(&path), what)?;
         }
         let texels = Arc::new(texels);
-        self.bitmaps.insert(key, Arc::clone(&texels));
+        self.bitmaps.entry(path).or_default().push((selection, Arc::clone(&texels)));
         Ok(texels)
     }
 

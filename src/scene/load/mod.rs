@@ -91,7 +91,7 @@ fn build(path: &Path, tree: xml::Tree, options: &Options) -> Result<Scene> {
     let objects = tree.objects.clone();
     let mut loader = Loader::new(tree, options.texture_memory);
     let mut contents = Contents::default();
-    let (mut sensors, mut integrator) = (Vec::new(), None);
+    let (mut sensors, mut integrators) = (Vec::new(), Vec::new());
     for object in &objects {
         match object.class.as_str() {
             "shape" => contents.shape(object, &mut loader)?,
@@ -99,7 +99,7 @@ fn build(path: &Path, tree: xml::Tree, options: &Options) -> Result<Scene> {
             "emitter" if object.plugin == "area" && object.id.is_some() => {}
             "emitter" => contents.emitter(object, &mut loader)?,
             "sensor" => sensors.push(object),
-            "integrator" => integrator = Some(integrator::load(object, &mut loader)?),
+            "integrator" => integrators.push(object),
             // Named objects that nothing uses are allowed, and need not even be understood.
             "bsdf" | "texture" | "film" | "sampler" | "rfilter" => {}
             "medium" | "volume" | "phase" if object.id.is_some() => {}
@@ -116,7 +116,7 @@ fn build(path: &Path, tree: xml::Tree, options: &Options) -> Result<Scene> {
     };
     let sensors = sensors.into_iter().map(|object| SensorInfo::new(object)).collect();
     let Contents { shapes, groups, emitters } = contents;
-    let integrator = integrator.unwrap_or_default();
+    let integrator = integrator::choose(&integrators, &mut loader)?;
     let groups = groups.into_values();
     let grouped = groups.iter().flat_map(|group| &group.shapes);
     let (attributes, files, warnings) = loader.finish();
@@ -145,8 +145,12 @@ fn choose<'a>(sensors: &[&'a Rc<Object>], options: &Options, loc: &SourceLoc) ->
             None => number.to_string(),
         };
         let names: Vec<_> = sensors.iter().enumerate().map(name).collect();
-        let names = if names.is_empty() { "none".into() } else { names.join(", ") };
-        Error::Usage(format!("{loc} has no sensor `{wanted}`; there are {names}"))
+        let names = match names.as_slice() {
+            [] => "it has none".to_owned(),
+            [only] => format!("it has number {only}"),
+            several => format!("it has numbers {}", several.join(", ")),
+        };
+        Error::Usage(format!("{loc} has no sensor `{wanted}`; {names}"))
     })
 }
 
@@ -169,6 +173,7 @@ pub const UNSUPPORTED: &[(&str, &str, &str)] = &[
     ("bsdf", "hair", "curves are not traced"),
     ("bsdf", "measured", "measured materials are not read; principled comes near"),
     ("bsdf", "hk", "media are not supported"),
+    ("bsdf", "difftrans", "principledthin with diff_trans comes near"),
     ("bsdf", "irawan", "woven cloth is not read; roughdiffuse comes near"),
     ("shape", "hair", "curves are not traced; export them as a mesh"),
     ("shape", "heightfield", "export it as a mesh"),
@@ -177,6 +182,10 @@ pub const UNSUPPORTED: &[(&str, &str, &str)] = &[
     ("shape", "sdfgrid", "distance fields are not traced; export them as a mesh"),
     ("shape", "ellipsoids", "splats are not traced"),
     ("shape", "ellipsoidsmesh", "splats are not traced"),
+    ("texture", "gridtexture", "use a checkerboard or an image"),
+    ("texture", "vertexcolors", "use mesh_attribute with the name vertex_color"),
+    ("texture", "wireframe", "edges of triangles are not drawn; use an image"),
+    ("texture", "curvature", "use an image"),
     ("texture", "volume", "volumes are not supported"),
 ];
 

@@ -125,7 +125,7 @@ impl Object {
     /// A string out of a few, by its position among them.
     pub fn choice(&self, name: &str, choices: &[&str], default: usize) -> Result<usize> {
         let value = self.string(name, choices[default])?;
-        choices.iter().position(|choice| *choice == value).ok_or_else(|| {
+        choices.iter().position(|choice| choice.eq_ignore_ascii_case(&value)).ok_or_else(|| {
             self.loc_of(name).unsupported(format!("`{name}` is `{value}`; it may be {}", choices.join(", ")))
         })
     }

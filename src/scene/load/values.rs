@@ -35,10 +35,11 @@ pub fn boolean(text: &str, loc: &SourceLoc) -> Result<bool> {
     }
 }
 
-/// Three numbers.
+/// Three numbers, or one for all three.
 pub fn triple(text: &str, loc: &SourceLoc) -> Result<Vec3> {
     match numbers(text, loc)?.as_slice() {
         &[x, y, z] => Ok(vec3(x as f32, y as f32, z as f32)),
+        &[all] => Ok(Vec3::splat(all as f32)),
         other => Err(loc.invalid(format!("`{text}` has {} numbers; three are needed", other.len()))),
     }
 }

@@ -121,8 +121,9 @@ impl Parser {
             return Err(root.loc().invalid(format!("a scene file starts with <scene>, not <{}>", root.tag())));
         }
         let version = root.element.attribute("version").unwrap_or(if self.legacy { "0.6.0" } else { "3.0.0" });
-        if !version.starts_with(['0', '2', '3']) {
-            let what = format!("scene version {version}; versions 0.x, 2 and 3 are supported");
+        let version = version.trim();
+        if version.starts_with('1') || !version.starts_with(|first: char| first.is_ascii_digit()) {
+            let what = format!("scene version {version}; versions 0.x and from 2 on are supported");
             return Err(root.loc().unsupported(what));
         }
         let outer = std::mem::replace(&mut self.legacy, version.starts_with('0'));
@@ -138,8 +139,8 @@ impl Parser {
 
     pub fn include(&mut self, at: At, receive: Receiver) -> Result<()> {
         let name = self.attribute(at, "filename")?;
-        let path =
-            self.tree.folders.find_file(&name).ok_or_else(|| at.loc().invalid(self.tree.folders.missing(&name)))?;
+        let folders = self.tree.folders.for_included(at.file);
+        let path = folders.find_file(&name).ok_or_else(|| at.loc().invalid(folders.missing(&name)))?;
         if self.includes.len() >= MAX_INCLUDES || self.includes.contains(&path) || *path == **at.file {
             return Err(at.loc().invalid(format!("`{name}` includes itself")));
         }
@@ -147,7 +148,10 @@ impl Parser {
             return Err(at.loc().invalid(format!("more than {MAX_FILES} files in one scene")));
         }
         self.includes.push(path.clone());
+        let outer = std::mem::replace(&mut self.tree.folders, folders);
         self.file(&path, receive)?;
+        let inner = std::mem::replace(&mut self.tree.folders, outer);
+        self.tree.folders.remember(inner);
         self.includes.pop();
         Ok(())
     }

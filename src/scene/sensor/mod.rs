@@ -158,7 +158,7 @@ fn film_and_spp(object: &Object, loader: &Loader) -> Result<(Option<Rc<Object>>,
         }
     }
     let spp = u32::try_from(spp).ok().filter(|&spp| spp > 0);
-    Ok((film, spp.ok_or_else(|| object.loc.invalid("`sample_count` must be at least 1"))?))
+    Ok((film, spp.ok_or_else(|| object.loc.invalid("`sample_count` is a number from 1 to four billion"))?))
 }
 
 fn projection(object: &Object, far: f32) -> Result<Projection> {

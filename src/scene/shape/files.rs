@@ -41,6 +41,10 @@ fn make(object: &Object, loader: &mut Loader) -> Result<Geometry> {
     // Older files say how a mesh is cut into several, each with the materials of the file.
     object.ignore(&["collapse", "load_materials", "srgb"]);
     let mut data = loader.mesh(object)?;
+    if data.triangles.is_empty() {
+        let what = format!("the {} file has no faces that can be read: nothing is shown of it", object.plugin);
+        loader.warn(&object.loc_of("filename"), what)?;
+    }
     if let Some(degrees) = smooth_up_to {
         data = smooth::split(data, degrees);
     }

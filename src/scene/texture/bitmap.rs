@@ -4,6 +4,7 @@ use std::sync::{Arc, OnceLock};
 
 use super::{Point, Selection, Texels, Texture, UvTransform};
 use crate::error::Result;
+use crate::image::channels::Integers;
 use crate::math::{Rgb, Vec2, luminance, vec2};
 use crate::scene::load::props::Object;
 use crate::scene::load::{Loader, Plugin};
@@ -12,7 +13,7 @@ use crate::scene::load::{Loader, Plugin};
 pub const PLUGIN: Plugin<Arc<dyn Texture>> = Plugin {
     name: "bitmap",
     parameters: "filename, filter_type = bilinear (nearest), wrap_mode = repeat (mirror, clamp, zero, one), \
-        wrap_mode_u and wrap_mode_v = wrap_mode, raw = false, channel (r, g, b, a, x, y, z), to_uv, \
+        wrap_mode_u and wrap_mode_v = wrap_mode, raw = false or gamma, channel (r, g, b, a, x, y, z), to_uv, \
         format, accel (both ignored)",
     make,
 };
@@ -24,10 +25,24 @@ fn make(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Texture>> {
     // Files keep their own precision.
     object.ignore(&["format", "accel"]);
     let channel = object.get("channel").map(|_| object.string("channel", "")).transpose()?;
-    let selection = Selection { raw: object.boolean("raw", false)?, channel };
+    let selection = Selection { integers: integers(object)?, channel };
     let to_uv = UvTransform::load(object)?;
     let texels = loader.texels(object, selection)?;
     Ok(Arc::new(Bitmap { texels, nearest, wrap, to_uv, mean: OnceLock::new() }))
+}
+
+/// Decoding of integers, by `raw` or `gamma`.
+pub fn integers(object: &Object) -> Result<Integers> {
+    if object.boolean("raw", false)? {
+        object.ignore(&["gamma"]);
+        return Ok(Integers::Raw);
+    }
+    match object.get("gamma").is_some().then(|| object.float("gamma", 1.0)).transpose()? {
+        None => Ok(Integers::Srgb),
+        Some(1.0) => Ok(Integers::Raw),
+        Some(gamma) if gamma > 0.0 => Ok(Integers::Gamma(gamma)),
+        Some(gamma) => Err(object.loc_of("gamma").invalid(format!("a gamma of {gamma}; it must be positive"))),
+    }
 }
 
 /// Continuation of an image beyond its border, along one axis.

@@ -1,6 +1,6 @@
 //! Textures: linear colour as a function of texture coordinates. v counts downwards in image files.
 
-mod bitmap;
+pub mod bitmap;
 mod checkerboard;
 mod mesh_attribute;
 mod scale;

@@ -5,15 +5,15 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, OnceLock};
 
 use crate::error::Result;
-use crate::image::channels::{ColorChannels, Decoding};
+use crate::image::channels::{ColorChannels, Decoding, Integers};
 use crate::image::io::{CachedTexture, ImageFile, TextureSystem};
 use crate::math::{Rgb, half, srgb_decode, vec3};
 
 /// Part of an image file that is read.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Selection {
-    /// Take integers as they are instead of decoding sRGB.
-    pub raw: bool,
+    /// How integers are decoded.
+    pub integers: Integers,
     /// A single channel in place of the colours.
     pub channel: Option<String>,
 }
@@ -72,8 +72,8 @@ impl Texels {
     pub fn read(path: &Path, selection: &Selection, memory: &mut Memory) -> Result<(Self, usize)> {
         let file = ImageFile::open(path)?;
         let colors = match &selection.channel {
-            Some(channel) => ColorChannels::single(&file, path, channel, selection.raw)?,
-            None => ColorChannels::of(&file, path, selection.raw)?,
+            Some(channel) => ColorChannels::single(&file, path, channel, selection.integers)?,
+            None => ColorChannels::of(&file, path, selection.integers)?,
         };
         let (width, height, order) = (file.width, file.height, colors.order);
         let eight_bit = colors.is_eight_bit(&file);
@@ -183,7 +183,9 @@ fn decoded(decoding: Decoding) -> &'static [f32; 256] {
     static SRGB: OnceLock<[f32; 256]> = OnceLock::new();
     match decoding {
         Decoding::Srgb => SRGB.get_or_init(|| std::array::from_fn(|i| srgb_decode(i as f32 / 255.0))),
-        Decoding::Linear | Decoding::Integer => LINEAR.get_or_init(|| std::array::from_fn(|i| i as f32 / 255.0)),
+        Decoding::Linear | Decoding::Integer | Decoding::Gamma(_) => {
+            LINEAR.get_or_init(|| std::array::from_fn(|i| i as f32 / 255.0))
+        }
     }
 }
 
@@ -199,8 +201,15 @@ mod tests {
         for name in ["a.png", "a.exr"] {
             let path = folder.path().join(name);
             io::write_color(&path, &image, &io::Extras::default()).unwrap();
-            let read =
-                |raw, bytes| Texels::read(&path, &Selection { raw, channel: None }, &mut Memory::new(bytes)).unwrap().0;
+            let read = |raw, bytes| {
+                Texels::read(
+                    &path,
+                    &Selection { integers: if raw { Integers::Raw } else { Integers::Srgb }, channel: None },
+                    &mut Memory::new(bytes),
+                )
+                .unwrap()
+                .0
+            };
             for (x, y, raw) in [(0, 0, false), (89, 69, true), (40, 65, false), (70, 3, true)] {
                 let (held, cached) = (read(raw, 1 << 20), read(raw, 100));
                 assert!(matches!(cached.samples, Samples::Cached { .. }));

@@ -160,7 +160,7 @@ impl OffsetSurfaces {
     fn intersect(&mut self, scene: &Scene, rays: &Rays, count: usize) -> Mask {
         let packet = self.next_packet();
         let mut hit = scene.intersect_packet(rays, Mask::first(count), true, &mut packet.surfaces);
-        if scene.integrator().hide_emitters {
+        if scene.integrator().pass_emitters {
             scene.pass_emitters(rays, &mut hit, &mut packet.surfaces);
         }
         packet.materials.evaluate(scene, &packet.surfaces, hit);

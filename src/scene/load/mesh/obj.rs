@@ -16,6 +16,8 @@ type Corner = (usize, Option<usize>, Option<usize>);
 /// coordinate or normal, in a file that has them, gets zero.
 pub fn read(bytes: &[u8], path: &Path) -> Result<MeshData> {
     let text = String::from_utf8_lossy(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes));
+    // Lines of old Macs end in a carriage return alone.
+    let text = if text.contains('\n') { text } else { text.replace('\r', "\n").into() };
     let mut file = File::default();
     let mut lines = (1..).zip(text.lines());
     while let Some((number, line)) = lines.next() {

@@ -17,6 +17,14 @@ pub struct Triangulation {
 impl Triangulation {
     /// Appends the triangles of a polygon: around its first corner if it is convex, by ear clipping otherwise.
     pub fn add(&mut self, corners: &[u32], positions: &[Vec3], triangles: &mut Vec<[u32; 3]>) {
+        // A corner that is given twice turns neither way, and would hide that its neighbours do.
+        let mut distinct = corners.to_vec();
+        distinct.dedup_by_key(|corner| positions[*corner as usize].to_array().map(f32::to_bits));
+        let ends = |list: &[u32]| [list[0], list[list.len() - 1]].map(|corner| positions[corner as usize]);
+        while distinct.len() > 1 && ends(&distinct)[0] == ends(&distinct)[1] {
+            distinct.pop();
+        }
+        let corners = &distinct;
         let normal = normal(corners, positions);
         if corners.len() <= 3 || is_convex(corners, positions, normal) || !self.clip(corners, positions) {
             triangles.extend(corners.windows(2).skip(1).map(|pair| [corners[0], pair[0], pair[1]]));
@@ -88,6 +96,8 @@ mod tests {
         let square = [[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]];
         let dart = [[0.0, 0.0], [2.0, 0.0], [0.5, 0.5], [0.0, 2.0]];
         let late_dart = [[2.0, 0.0], [0.5, 0.5], [0.0, 2.0], [0.0, 0.0]];
+        let doubled = [[0.0, 0.0], [2.0, 0.0], [0.5, 0.5], [0.5, 0.5], [0.0, 2.0], [0.0, 2.0], [0.0, 0.0]];
+        assert!((cut(&doubled).1 - 1.0).abs() < 1e-5 && (cut(&doubled[3..]).1 + 1.0).abs() > 0.5);
         let comb = [[0.0, 0.0], [5.0, 0.0], [5.0, 2.0], [4.0, 2.0], [4.0, 1.0], [3.0, 1.0], [3.0, 2.0], [0.0, 2.0]];
         for (outline, expected) in [(&square[..], 4.0), (&dart, 1.0), (&late_dart, 1.0), (&comb, 9.0)] {
             let (count, area) = cut(outline);
