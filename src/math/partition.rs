@@ -32,7 +32,7 @@ struct Cuts {
 }
 
 impl Cuts {
-    /// Of intervals in their order, with their weights.
+    /// Cuts between intervals that follow each other, with their weights.
     fn new(intervals: &[(Range<u32>, f64)]) -> Self {
         let mut starts: Vec<u32> = intervals.iter().map(|(range, _)| range.start).collect();
         let end = intervals.last().map_or(0, |(range, _)| range.end);
@@ -66,7 +66,7 @@ impl Cuts {
         while index < last && sums[index + 1] <= target {
             index += 1;
         }
-        // Parts are computed in floats, which may round up; and an interval without weight may stand beside the one meant.
+        // The part is computed in floats, which may round up; and an interval without weight may stand beside the one meant.
         while index > 0 && (sums[index] > target || sums[index + 1] == sums[index]) {
             index -= 1;
         }
@@ -102,7 +102,7 @@ impl Cuts {
 pub struct Partition {
     size: Vec2,
     rows: Cuts,
-    /// Of each strip of rows.
+    /// Cells of each strip.
     columns: Vec<Cuts>,
 }
 
@@ -174,7 +174,7 @@ impl Ord for Interval {
     }
 }
 
-/// Halves whatever has the most excess until there are `most` intervals. They come in the order of their places.
+/// Halves whatever has the most excess until there are `most` intervals. They come in order.
 fn cut(whole: Vec<Interval>, most: usize, weigh: impl Fn(usize, &Range<u32>) -> [f64; 2]) -> Vec<Interval> {
     let (mut open, mut done) = (BinaryHeap::from(whole), Vec::new());
     while let Some(Interval { strip, range, excess, .. }) = open.peek().cloned() {
