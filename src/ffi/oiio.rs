@@ -42,7 +42,7 @@ pub enum Storage {
 }
 
 /// Position of an image in a larger picture, of which it is a part.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct DataWindow {
     /// Column and row of its first pixel.
     pub origin: (usize, usize),
@@ -305,7 +305,7 @@ pub fn write(path: &Path, pixels: &Pixels, kind: Kind, compression: Option<&str>
     let c_string = |text: &str| CString::new(text).map_err(|_| Error::io(path, "a name holds a NUL byte"));
     let name = path_string(path)?;
     let size = |n: usize| i32::try_from(n).map_err(|_| Error::io(path, "the image is too large for any format"));
-    let DataWindow { origin, full } = pixels.window.unwrap_or(DataWindow { origin: (0, 0), full: (0, 0) });
+    let DataWindow { origin, full } = pixels.window.unwrap_or_default();
     let spec = raw::FluxionImageSpec {
         width: size(pixels.width)?,
         height: size(pixels.height)?,

@@ -112,10 +112,9 @@ impl<'a> File<'a> {
 
     /// The group with the first of some names that the file has.
     fn named(&self, names: &[&str], channels: usize) -> Option<Group> {
-        let last = |prefix: &str| prefix.rsplit('.').next().unwrap_or_default().to_owned();
         let prefixes = self.prefixes();
         names.iter().find_map(|name| {
-            let of_name = prefixes.iter().filter(|prefix| last(prefix) == *name);
+            let of_name = prefixes.iter().filter(|prefix| component(prefix) == *name);
             of_name.into_iter().find_map(|prefix| match channels {
                 1 => self.group(prefix, &["x"]).or_else(|| self.group(prefix, &["y"])),
                 _ => COMPONENTS[..2].iter().find_map(|components| self.group(prefix, components)),
@@ -129,7 +128,7 @@ impl<'a> File<'a> {
         let by_component = || prefixes.iter().find_map(|prefix| self.group(prefix, COMPONENTS[2]));
         let by_name = || {
             names.iter().find_map(|name| {
-                let of_name = prefixes.iter().filter(|prefix| prefix.rsplit('.').next() == Some(name));
+                let of_name = prefixes.iter().filter(|prefix| component(prefix) == *name);
                 of_name.into_iter().find_map(|prefix| self.group(prefix, &["z"]).or_else(|| self.group(prefix, &["v"])))
             })
         };
@@ -163,7 +162,7 @@ impl<'a> File<'a> {
         }
         let features: Vec<&str> = NAMES[1..].iter().flat_map(|(_, names)| names.iter().copied()).collect();
         let prefixes = self.prefixes();
-        let is_color = |prefix: &&&str| !features.contains(&prefix.rsplit('.').next().unwrap_or_default());
+        let is_color = |prefix: &&&str| !features.contains(&component(prefix));
         let of_colors = || prefixes.iter().filter(is_color);
         let exact = of_colors().find_map(|prefix| self.variance(&self.group(prefix, COMPONENTS[0])?, counts));
         exact.or_else(|| {
@@ -189,6 +188,7 @@ fn from_luminance(variance: &Image, xyz: &Image, color: &Image) -> Image {
     result
 }
 
+/// Part of a name after its last point.
 fn component(name: &str) -> &str {
     name.rsplit('.').next().unwrap_or_default()
 }

@@ -146,9 +146,7 @@ impl Bsdf for Coating {
         let above = if wi.z < 0.0 { mirror(wi) } else { wi };
         let wo = fresnel::reflect_about(above, facets.sample_visible(above, u));
         let wo = if wi.z < 0.0 { mirror(wo) } else { wo };
-        let Eval { value, pdf } = self.eval(surface, wi, wo);
-        let reflects = wo.z * wi.z > 0.0 && pdf > 0.0;
-        reflects.then(|| BsdfSample { wo, weight: value / pdf, pdf, lobe: Lobe::Smooth, eta: 1.0 })
+        if wo.z * wi.z > 0.0 { self.eval(surface, wi, wo).sampled(wo) } else { None }
     }
 
     fn eval(&self, surface: &Surface, wi: Vec3, wo: Vec3) -> Eval {

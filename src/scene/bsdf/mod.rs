@@ -114,6 +114,20 @@ pub struct Eval {
     pub pdf: f32,
 }
 
+impl Eval {
+    /// The sample of a direction in which a smooth lobe has this value; none where it is never sampled.
+    pub fn sampled(self, wo: Vec3) -> Option<BsdfSample> {
+        let Self { value, pdf } = self;
+        (pdf > 0.0).then(|| BsdfSample { wo, weight: value / pdf, pdf, lobe: Lobe::Smooth, eta: 1.0 })
+    }
+}
+
+/// Share of a specular lobe in sampling beside a diffuse one, by their mean reflectances.
+fn specular_share(diffuse: &dyn Texture, specular: &dyn Texture) -> f32 {
+    let total = diffuse.mean() + specular.mean();
+    if total > 0.0 { specular.mean() / total } else { 0.5 }
+}
+
 /// Scattering by a delta lobe.
 #[derive(Clone, Copy, Debug)]
 pub struct Delta {

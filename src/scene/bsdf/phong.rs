@@ -3,7 +3,7 @@
 use std::f32::consts::{FRAC_1_PI, TAU};
 use std::sync::Arc;
 
-use super::{Bsdf, BsdfSample, Eval, Lobe};
+use super::{Bsdf, BsdfSample, Eval, specular_share};
 use crate::error::Result;
 use crate::math::{Frame, Rgb, Vec2, Vec3, fresnel, luminance, vec3, warp};
 use crate::scene::Surface;
@@ -36,8 +36,7 @@ impl Pair {
         let specular = loader.texture(object, "specular_reflectance", Rgb::splat(0.2))?;
         let largest = (diffuse.largest() + specular.largest()).max_element();
         let scale = if largest > 1.0 { 0.99 / largest } else { 1.0 };
-        let (d, s) = (diffuse.mean(), specular.mean());
-        let specular_share = if d + s > 0.0 { s / (d + s) } else { 0.5 };
+        let specular_share = specular_share(&*diffuse, &*specular);
         Ok(Self { diffuse, specular, scale, specular_share })
     }
 
@@ -86,8 +85,7 @@ impl Bsdf for Phong {
         } else {
             warp::cosine_hemisphere(u)
         };
-        let Eval { value, pdf } = self.eval(surface, wi, wo);
-        (pdf > 0.0).then(|| BsdfSample { wo, weight: value / pdf, pdf, lobe: Lobe::Smooth, eta: 1.0 })
+        self.eval(surface, wi, wo).sampled(wo)
     }
 
     fn eval(&self, surface: &Surface, wi: Vec3, wo: Vec3) -> Eval {

@@ -3,7 +3,7 @@
 use std::f32::consts::FRAC_1_PI;
 use std::sync::Arc;
 
-use super::{Bsdf, BsdfSample, Delta, Eval, Lobe, POLYPROPYLENE, relative_ior};
+use super::{Bsdf, BsdfSample, Delta, Eval, Lobe, POLYPROPYLENE, relative_ior, specular_share};
 use crate::error::Result;
 use crate::math::{Rgb, Vec2, Vec3, fresnel, warp};
 use crate::scene::Surface;
@@ -43,8 +43,7 @@ impl Base {
         let diffuse = loader.texture(object, "diffuse_reflectance", Rgb::splat(0.5))?;
         let specular = loader.texture(object, "specular_reflectance", Rgb::ONE)?;
         let nonlinear = object.boolean("nonlinear", false)?;
-        let total = diffuse.mean() + specular.mean();
-        let specular_share = if total > 0.0 { specular.mean() / total } else { 0.5 };
+        let specular_share = specular_share(&*diffuse, &*specular);
         Ok(Self { diffuse, specular, nonlinear, internal, inverse_eta_squared: 1.0 / (eta * eta), specular_share })
     }
 
@@ -95,8 +94,7 @@ impl Bsdf for Plastic {
             return Some(BsdfSample { wo, weight, pdf: probability, lobe: Lobe::DeltaReflect, eta: 1.0 });
         }
         let wo = warp::cosine_hemisphere(u);
-        let Eval { value, pdf } = self.eval(surface, wi, wo);
-        (pdf > 0.0).then(|| BsdfSample { wo, weight: value / pdf, pdf, lobe: Lobe::Smooth, eta: 1.0 })
+        self.eval(surface, wi, wo).sampled(wo)
     }
 
     fn eval(&self, surface: &Surface, wi: Vec3, wo: Vec3) -> Eval {

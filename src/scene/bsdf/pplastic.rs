@@ -5,7 +5,7 @@ use std::f32::consts::FRAC_1_PI;
 use std::sync::Arc;
 
 use super::microfacet::{Kind, Microfacet};
-use super::{Bsdf, BsdfSample, Eval, Lobe, POLYPROPYLENE, relative_ior};
+use super::{Bsdf, BsdfSample, Eval, POLYPROPYLENE, relative_ior, specular_share};
 use crate::error::Result;
 use crate::math::{Rgb, Vec2, Vec3, fresnel, vec2, warp};
 use crate::scene::Surface;
@@ -27,8 +27,7 @@ fn make(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Bsdf>> {
     let alpha = vec2(object.float("alpha_u", alpha)?, object.float("alpha_v", alpha)?);
     let diffuse = loader.texture(object, "diffuse_reflectance", Rgb::splat(0.5))?;
     let specular = loader.texture(object, "specular_reflectance", Rgb::ONE)?;
-    let total = diffuse.mean() + specular.mean();
-    let specular_share = if total > 0.0 { specular.mean() / total } else { 0.5 };
+    let specular_share = specular_share(&*diffuse, &*specular);
     let facets = Microfacet::anisotropic(Kind::load(object, loader)?, alpha);
     Ok(Arc::new(Pplastic { eta: relative_ior(object, POLYPROPYLENE)?, facets, diffuse, specular, specular_share }))
 }
@@ -51,8 +50,7 @@ impl Bsdf for Pplastic {
         } else {
             warp::cosine_hemisphere(u)
         };
-        let Eval { value, pdf } = self.eval(surface, wi, wo);
-        (pdf > 0.0).then(|| BsdfSample { wo, weight: value / pdf, pdf, lobe: Lobe::Smooth, eta: 1.0 })
+        self.eval(surface, wi, wo).sampled(wo)
     }
 
     fn eval(&self, surface: &Surface, wi: Vec3, wo: Vec3) -> Eval {

@@ -3,7 +3,7 @@
 use std::f32::consts::{FRAC_1_PI, PI};
 use std::sync::Arc;
 
-use super::{Bsdf, BsdfSample, Eval, Lobe};
+use super::{Bsdf, BsdfSample, Eval};
 use crate::error::Result;
 use crate::math::{Rgb, Vec2, Vec3, warp};
 use crate::scene::Surface;
@@ -79,8 +79,7 @@ impl RoughDiffuse {
 impl Bsdf for RoughDiffuse {
     fn sample(&self, surface: &Surface, wi: Vec3, _lobe: f32, u: Vec2) -> Option<BsdfSample> {
         let wo = warp::cosine_hemisphere(u);
-        let Eval { value, pdf } = self.eval(surface, wi, wo);
-        (pdf > 0.0).then(|| BsdfSample { wo, weight: value / pdf, pdf, lobe: Lobe::Smooth, eta: 1.0 })
+        self.eval(surface, wi, wo).sampled(wo)
     }
 
     fn eval(&self, surface: &Surface, wi: Vec3, wo: Vec3) -> Eval {

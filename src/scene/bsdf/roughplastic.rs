@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::microfacet::{Kind, Microfacet, RoughTransmittance};
 use super::plastic::Base;
-use super::{Bsdf, BsdfSample, Eval, Lobe, POLYPROPYLENE, relative_ior};
+use super::{Bsdf, BsdfSample, Eval, POLYPROPYLENE, relative_ior};
 use crate::error::Result;
 use crate::math::{Rgb, Vec2, Vec3, fresnel, warp};
 use crate::scene::Surface;
@@ -50,8 +50,7 @@ impl Bsdf for RoughPlastic {
         } else {
             warp::cosine_hemisphere(u)
         };
-        let Eval { value, pdf } = self.eval(surface, wi, wo);
-        (pdf > 0.0).then(|| BsdfSample { wo, weight: value / pdf, pdf, lobe: Lobe::Smooth, eta: 1.0 })
+        self.eval(surface, wi, wo).sampled(wo)
     }
 
     fn eval(&self, surface: &Surface, wi: Vec3, wo: Vec3) -> Eval {

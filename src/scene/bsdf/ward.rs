@@ -5,7 +5,7 @@ use std::f32::consts::{PI, TAU};
 use std::sync::Arc;
 
 use super::phong::Pair;
-use super::{Bsdf, BsdfSample, Eval, Lobe};
+use super::{Bsdf, BsdfSample, Eval};
 use crate::error::Result;
 use crate::math::{Rgb, Vec2, Vec3, vec3, warp};
 use crate::scene::Surface;
@@ -68,8 +68,7 @@ impl Bsdf for Ward {
         } else {
             warp::cosine_hemisphere(u)
         };
-        let Eval { value, pdf } = self.eval(surface, wi, wo);
-        (pdf > 0.0).then(|| BsdfSample { wo, weight: value / pdf, pdf, lobe: Lobe::Smooth, eta: 1.0 })
+        self.eval(surface, wi, wo).sampled(wo)
     }
 
     fn eval(&self, surface: &Surface, wi: Vec3, wo: Vec3) -> Eval {

@@ -1,6 +1,7 @@
 //! Emitters. Each can draw a point that lights a position, say how likely it was to draw a point, and how much
 //! radiance a point sends: three functions of the point, so that any point can be looked at from anywhere.
 
+mod apex;
 mod area;
 mod choice;
 mod constant;

@@ -3,10 +3,10 @@
 use std::f32::consts::PI;
 use std::sync::Arc;
 
-use super::{Emitter, Extent, LightPoint, Position};
+use super::apex::Apex;
+use super::{Emitter, Extent, LightPoint};
 use crate::error::Result;
-use crate::math::{Mat4, Rgb, Vec2, Vec3, vec2};
-use crate::scene::Bounds;
+use crate::math::{Rgb, Vec2, Vec3, vec2};
 use crate::scene::load::props::Object;
 use crate::scene::load::{Loader, Plugin};
 use crate::scene::sensor;
@@ -24,10 +24,8 @@ fn make(object: &Object, loader: &mut Loader) -> Result<Box<dyn Emitter>> {
     let slide = loader.radiance(object, "irradiance")?;
     let aspect = slide.resolution().map_or(1.0, |size| size.x / size.y);
     let half_width = sensor::half_width(object, aspect)?;
-    let to_world = object.transform("to_world")?;
     Ok(Box::new(Projector {
-        position: to_world.transform_point3(Vec3::ZERO),
-        to_local: to_world.inverse(),
+        apex: Apex::load(object)?,
         slide,
         scale: object.float("scale", 1.0)?,
         half_extent: vec2(half_width, half_width / aspect),
@@ -35,8 +33,7 @@ fn make(object: &Object, loader: &mut Loader) -> Result<Box<dyn Emitter>> {
 }
 
 struct Projector {
-    position: Vec3,
-    to_local: Mat4,
+    apex: Apex,
     /// Irradiance at distance one, across the unit square.
     slide: Arc<dyn Texture>,
     scale: f32,
@@ -46,7 +43,7 @@ struct Projector {
 
 impl Emitter for Projector {
     fn sample(&self, _from: Vec3, _u: Vec2) -> Option<LightPoint> {
-        Some(LightPoint::only(Position::Point { p: self.position }))
+        Some(self.apex.point())
     }
 
     fn pdf(&self, from: Vec3, point: &LightPoint) -> f32 {
@@ -55,7 +52,7 @@ impl Emitter for Projector {
 
     /// Power per solid angle.
     fn radiance(&self, _point: &LightPoint, direction: Vec3) -> Rgb {
-        let local = self.to_local.transform_vector3(direction).normalize_or_zero();
+        let local = self.apex.local(direction);
         if local.z <= 0.0 {
             return Rgb::ZERO;
         }
@@ -75,9 +72,7 @@ impl Emitter for Projector {
     }
 
     fn extent(&self) -> Option<Extent> {
-        let axis = self.to_local.inverse().transform_vector3(Vec3::Z).normalize_or(Vec3::Z);
-        let reach = self.half_extent.length().atan();
-        Some(Extent { bounds: Bounds::of([self.position]), axis, spread: 0.0, reach })
+        Some(self.apex.extent(self.half_extent.length().atan()))
     }
 
     fn name(&self) -> &'static str {

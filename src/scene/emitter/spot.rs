@@ -3,10 +3,10 @@
 use std::f32::consts::TAU;
 use std::sync::Arc;
 
-use super::{Emitter, Extent, LightPoint, Position};
+use super::apex::Apex;
+use super::{Emitter, Extent, LightPoint};
 use crate::error::Result;
-use crate::math::{Mat4, Rgb, Vec2, Vec3, vec2};
-use crate::scene::Bounds;
+use crate::math::{Rgb, Vec2, Vec3, vec2};
 use crate::scene::load::props::Object;
 use crate::scene::load::{Loader, Plugin};
 use crate::scene::texture::{self, Texture};
@@ -25,10 +25,8 @@ fn make(object: &Object, loader: &mut Loader) -> Result<Box<dyn Emitter>> {
         let what = format!("a cone of {cutoff} degrees around a beam of {beam}; needed: 0 <= beam <= cone <= 90");
         return Err(object.loc_of("cutoff_angle").invalid(what));
     }
-    let to_world = object.transform("to_world")?;
     Ok(Box::new(Spot {
-        position: to_world.transform_point3(Vec3::ZERO),
-        to_local: to_world.inverse(),
+        apex: Apex::load(object)?,
         intensity: loader.uniform_radiance(object, "intensity")?,
         slide: loader.texture(object, "texture", Rgb::ONE)?,
         cutoff: cutoff.to_radians(),
@@ -37,8 +35,7 @@ fn make(object: &Object, loader: &mut Loader) -> Result<Box<dyn Emitter>> {
 }
 
 struct Spot {
-    position: Vec3,
-    to_local: Mat4,
+    apex: Apex,
     /// Power per solid angle on the axis.
     intensity: Rgb,
     /// Colours the light; its unit square spans the cone.
@@ -50,7 +47,7 @@ struct Spot {
 
 impl Emitter for Spot {
     fn sample(&self, _from: Vec3, _u: Vec2) -> Option<LightPoint> {
-        Some(LightPoint::only(Position::Point { p: self.position }))
+        Some(self.apex.point())
     }
 
     fn pdf(&self, from: Vec3, point: &LightPoint) -> f32 {
@@ -58,7 +55,7 @@ impl Emitter for Spot {
     }
 
     fn radiance(&self, _point: &LightPoint, direction: Vec3) -> Rgb {
-        let local = self.to_local.transform_vector3(direction).normalize_or_zero();
+        let local = self.apex.local(direction);
         let angle = local.z.clamp(-1.0, 1.0).acos();
         if local == Vec3::ZERO || angle >= self.cutoff {
             return Rgb::ZERO;
@@ -75,8 +72,7 @@ impl Emitter for Spot {
     }
 
     fn extent(&self) -> Option<Extent> {
-        let axis = self.to_local.inverse().transform_vector3(Vec3::Z).normalize_or(Vec3::Z);
-        Some(Extent { bounds: Bounds::of([self.position]), axis, spread: 0.0, reach: self.cutoff })
+        Some(self.apex.extent(self.cutoff))
     }
 
     fn name(&self) -> &'static str {

@@ -12,7 +12,7 @@ pub mod mesh;
 pub mod props;
 pub mod spectrum;
 mod transform;
-mod values;
+pub mod values;
 mod warnings;
 mod xml;
 

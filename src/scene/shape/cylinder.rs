@@ -27,9 +27,8 @@ fn make(object: &Object, loader: &mut Loader) -> Result<Geometry> {
     let Frame { s, t, .. } = Frame::around(axis.normalize());
     let placed = Mat4::from_cols((s * radius).extend(0.0), (t * radius).extend(0.0), axis.extend(0.0), p0.extend(1.0));
     let to_world = object.transform("to_world")? * placed;
-    let [x, y, z] = [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| to_world.transform_vector3(axis));
-    let skewed = |a: Vec3, b: Vec3| a.dot(b).abs() > 1e-3 * a.length() * b.length();
-    if (x.length() - y.length()).abs() > 1e-3 * x.length() || skewed(x, y) || skewed(x, z) || skewed(y, z) {
+    let [x, y] = [Vec3::X, Vec3::Y].map(|axis| to_world.transform_vector3(axis).length());
+    if (x - y).abs() > 1e-3 * x || tessellation::is_sheared(to_world) {
         loader.warn(&object.loc_of("to_world"), "a cylinder scaled unevenly is traced as a mesh of triangles")?;
         let placement = Placement { to_world, face_normals: false, flip_normals: side < 0.0 };
         return loader.finite(object, Geometry::Mesh(Mesh::new(tessellation::cylinder(), placement)));

@@ -25,7 +25,7 @@ fn make(object: &Object, loader: &mut Loader) -> Result<Geometry> {
     if radius <= 0.0 || !radius.is_finite() {
         return Err(object.loc_of("radius").invalid("`radius` must be positive"));
     }
-    let skewed = axes.iter().any(|axis| (axis - axes[0]).abs() > 1e-3 * axes[0]) || is_sheared(to_world);
+    let skewed = axes.iter().any(|axis| (axis - axes[0]).abs() > 1e-3 * axes[0]) || tessellation::is_sheared(to_world);
     if skewed {
         loader.warn(&object.loc_of("to_world"), "a sphere scaled unevenly is traced as a mesh of triangles")?;
         let placed = to_world * Mat4::from_translation(center) * Mat4::from_scale(Vec3::splat(radius));
@@ -42,12 +42,6 @@ fn make(object: &Object, loader: &mut Loader) -> Result<Geometry> {
             side: if flip != mirrored { -1.0 } else { 1.0 },
         }),
     )
-}
-
-/// Whether a transform bends right angles.
-fn is_sheared(to_world: Mat4) -> bool {
-    let [x, y, z] = [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| to_world.transform_vector3(axis).normalize_or_zero());
-    [x.dot(y), x.dot(z), y.dot(z)].iter().any(|cosine| cosine.abs() > 1e-3)
 }
 
 /// One sphere in world space.

@@ -2,7 +2,7 @@
 
 use std::f32::consts::{PI, TAU};
 
-use crate::math::{Vec3, vec2, vec3};
+use crate::math::{Mat4, Vec3, vec2, vec3};
 use crate::scene::load::MeshData;
 
 /// Columns around an axis, by which areas are too small by one part in ten thousand.
@@ -25,6 +25,12 @@ pub fn cylinder() -> MeshData {
         let (y, x) = (TAU * u).sin_cos();
         (vec3(x, y, v), vec3(x, y, 0.0))
     })
+}
+
+/// Whether a transform bends right angles.
+pub fn is_sheared(to_world: Mat4) -> bool {
+    let [x, y, z] = [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| to_world.transform_vector3(axis).normalize_or_zero());
+    [x.dot(y), x.dot(z), y.dot(z)].iter().any(|cosine| cosine.abs() > 1e-3)
 }
 
 /// Squares of (u, v), each as two triangles that face along the normals. `at` gives position and normal.

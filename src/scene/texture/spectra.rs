@@ -7,7 +7,7 @@ use crate::error::Result;
 use crate::math::Rgb;
 use crate::scene::load::props::{Object, Property, Value};
 use crate::scene::load::spectrum::Spectrum;
-use crate::scene::load::{Loader, Plugin};
+use crate::scene::load::{Loader, Plugin, values};
 
 /// `d65`: daylight, which is white in linear sRGB, in a colour.
 pub const D65: Plugin<Arc<dyn Texture>> =
@@ -54,9 +54,7 @@ pub fn curve(object: &Object) -> Result<Option<Spectrum>> {
             Some(Property { value: Value::String(text), .. }) => text.clone(),
             _ => return Err(object.loc.invalid(format!("`{}` needs a list of numbers `{name}`", object.plugin))),
         };
-        let words = text.split([',', ' ', '\n', '\t']).filter(|word| !word.is_empty());
-        let numbers = words.map(|word| word.parse().map_err(|_| format!("`{word}` is not a number")));
-        numbers.collect::<Result<_, _>>().map_err(|what| object.loc_of(name).invalid(what))
+        values::numbers(&text, &object.loc_of(name))
     };
     let pairs = match object.plugin.as_str() {
         "blackbody" => {

@@ -8,7 +8,7 @@ use crate::error::Result;
 use crate::math::{Rgb, Vec2, Vec3, fresnel, warp};
 use crate::scene::Surface;
 use crate::scene::bsdf::microfacet::Microfacet;
-use crate::scene::bsdf::{Bsdf, BsdfSample, Eval, Lobe, mirror};
+use crate::scene::bsdf::{Bsdf, BsdfSample, Eval, mirror};
 use crate::scene::load::props::Object;
 use crate::scene::load::{Loader, Plugin};
 use crate::scene::texture::Texture;
@@ -112,8 +112,7 @@ impl Bsdf for PrincipledThin {
             -warp::cosine_hemisphere(u)
         };
         let wo = wo.normalize() * side;
-        let Eval { value, pdf } = self.eval(surface, wi, wo);
-        (pdf > 0.0).then(|| BsdfSample { wo, weight: value / pdf, pdf, lobe: Lobe::Smooth, eta: 1.0 })
+        self.eval(surface, wi, wo).sampled(wo)
     }
 
     fn eval(&self, surface: &Surface, wi: Vec3, wo: Vec3) -> Eval {
