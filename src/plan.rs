@@ -101,6 +101,7 @@ fn of_scene(scene: &Scene, needs: Needs) -> Vec<Item> {
     let stats = scene.stats();
     let item = |name, computed, reason: String| Item { name, computed, reason };
     let of_shapes = |count: usize, what: &str| format!("{count} of {} shapes {what}", stats.shapes);
+    let single = stats.shapes - stats.closing;
     let (others, lens) = (stats.shapes - stats.diffuse, scene.sensor().has_lens());
     let half_vectors = match (needs.edges.is_sampled(), others) {
         (false, _) => "without gradients no path is shifted".to_owned(),
@@ -114,7 +115,7 @@ fn of_scene(scene: &Scene, needs: Needs) -> Vec<Item> {
     };
     let hidden = scene.integrator().hide_emitters;
     vec![
-        item("materials", others > 0, of_shapes(others, "have a material that is evaluated ray by ray")),
+        item("materials", single > 0, of_shapes(single, "have a material that is evaluated ray by ray")),
         item("textures", stats.textured > 0, of_shapes(stats.textured, "need texture coordinates")),
         item("derivatives", stats.perturbed > 0, of_shapes(stats.perturbed, "have a material that perturbs normals")),
         item(

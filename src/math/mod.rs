@@ -16,9 +16,14 @@ pub use glam::{Mat4, Vec2, Vec3, Vec4, vec2, vec3};
 /// Linear RGB: radiance, reflectance or throughput, by context.
 pub type Rgb = Vec3;
 
+/// Shares of the channels in [`luminance`].
+pub fn luminance_weights() -> Rgb {
+    vec3(0.212_671, 0.715_160, 0.072_169)
+}
+
 /// Rec. 709 luminance of linear RGB.
 pub fn luminance(color: Rgb) -> f32 {
-    color.dot(vec3(0.212_671, 0.715_160, 0.072_169))
+    color.dot(luminance_weights())
 }
 
 /// The sRGB transfer function: linear in, display-encoded out, both nominally in [0, 1].

@@ -2,30 +2,49 @@
 
 use std::f32::consts::{FRAC_1_PI, FRAC_PI_4, PI};
 
-use super::lanes::cos_sin_small;
+use super::lanes::{Lanes, Lanes3};
 use super::{Vec2, Vec3, vec2, vec3};
 
 /// Uniform on the unit disk (Shirley and Chiu 1997, concentric map).
 pub fn disk(u: Vec2) -> Vec2 {
-    let offset = 2.0 * u - 1.0;
-    if offset == Vec2::ZERO {
-        return Vec2::ZERO;
-    }
-    let wide = offset.x.abs() > offset.y.abs();
-    let (radius, other) = if wide { (offset.x, offset.y) } else { (offset.y, offset.x) };
-    let (cos, sin) = cos_sin_small(FRAC_PI_4 * (other / radius), |constant| constant);
-    radius * if wide { vec2(cos, sin) } else { vec2(sin, cos) }
+    let [x, y] = disk_lanes::<1>([u.x, u.y].map(|u| Lanes([u])));
+    vec2(x.0[0], y.0[0])
+}
+
+/// [`disk`] for several points at a time.
+#[inline(always)]
+pub fn disk_lanes<const N: usize>([u, v]: [Lanes<N>; 2]) -> [Lanes<N>; 2] {
+    let two = Lanes::splat(2.0);
+    let (x, y) = (two * u - Lanes::ONE, two * v - Lanes::ONE);
+    let wide = x.abs().greater(y.abs());
+    let (radius, other) = (wide.select(x, y), wide.select(y, x));
+    let nonzero = radius.abs().greater(Lanes::ZERO);
+    let angle = nonzero.select(Lanes::splat(FRAC_PI_4) * (other / radius), Lanes::ZERO);
+    let (cosine, sine) = angle.cos_sin_small();
+    [radius * wide.select(cosine, sine), radius * wide.select(sine, cosine)]
 }
 
 /// Cosine-weighted on the upper hemisphere; density cos θ / π.
 pub fn cosine_hemisphere(u: Vec2) -> Vec3 {
-    let d = disk(u);
-    vec3(d.x, d.y, (1.0 - d.length_squared()).max(0.0).sqrt())
+    cosine_hemisphere_lanes::<1>([u.x, u.y].map(|u| Lanes([u]))).get(0)
+}
+
+/// [`cosine_hemisphere`] for several points at a time.
+#[inline(always)]
+pub fn cosine_hemisphere_lanes<const N: usize>(u: [Lanes<N>; 2]) -> Lanes3<N> {
+    let [x, y] = disk_lanes(u);
+    Lanes3 { x, y, z: (Lanes::ONE - (x * x + y * y)).max(Lanes::ZERO).sqrt() }
 }
 
 /// Density of [`cosine_hemisphere`] per solid angle.
 pub fn cosine_hemisphere_pdf(cos: f32) -> f32 {
     cos.max(0.0) * FRAC_1_PI
+}
+
+/// [`cosine_hemisphere_pdf`] for several directions at a time.
+#[inline(always)]
+pub fn cosine_hemisphere_pdfs<const N: usize>(cos: Lanes<N>) -> Lanes<N> {
+    cos.max(Lanes::ZERO) * Lanes::splat(FRAC_1_PI)
 }
 
 /// Uniform on the unit sphere; density 1 / 4π.

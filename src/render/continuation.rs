@@ -5,6 +5,7 @@ use super::direct::sample_emitters;
 use super::paths::{Packet, Paths};
 use super::vertices::Vertices;
 use crate::math::lanes::{Lanes, Lanes3, Mask};
+use crate::scene::bsdf::Lobe;
 use crate::scene::{Integrator, Scene};
 
 /// Largest survival probability of Russian roulette, so that paths in white rooms end. Radiance that is reflected with
@@ -39,7 +40,7 @@ pub fn shade(
     let numbers = sampler.scatter(packet.hash, depth);
     let choices = (numbers.lobe, numbers.direction);
     let found = materials.sample(scene, surfaces, choices, vertices.hit, scatters);
-    vertices.passed = found & scatters.pass();
+    vertices.passed = found & scatters.are(Lobe::Null);
     let throughput = packet.throughput.scale(scatters.weight);
     let sum = throughput.x + throughput.y + throughput.z;
     let non_finite = found & !sum.abs().less(Lanes::splat(f32::INFINITY));
@@ -57,7 +58,7 @@ pub fn shade(
     let throughput = throughput * (one / vertices.survival);
     let direction = surfaces.frame.to_world(scatters.wo).normalize_or(Lanes3::ZERO);
     let origin = surfaces.leave(direction);
-    let smooth = scatters.smooth();
+    let smooth = scatters.are(Lobe::Smooth);
     for lane in alive.lanes() {
         vertices.next.0[lane] = next.len() as u32;
         let (to, slot) = next.push();

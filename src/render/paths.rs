@@ -1,10 +1,12 @@
 //! Paths between two vertices, packed sixteen by sixteen, so that terminated paths leave no gaps.
 
+use crate::ffi::embree::Hits;
 use crate::math::lanes::{Bits, LANES, Lanes, Lanes3, Mask};
 use crate::scene::packet::Rays;
 
 /// Sixteen paths between two vertices.
 #[derive(Clone)]
+#[repr(align(64))]
 pub struct Packet {
     /// Rays of the current segments.
     pub rays: Rays,
@@ -27,7 +29,8 @@ pub struct Packet {
 }
 
 impl Packet {
-    const EMPTY: Self = Self {
+    /// Nothing.
+    pub const EMPTY: Self = Self {
         rays: Rays::NONE,
         throughput: Lanes3::ZERO,
         eta: Lanes::ZERO,
@@ -38,6 +41,65 @@ impl Packet {
         hash: Bits::ZERO,
         parent: Bits::ZERO,
     };
+}
+
+/// Copies lanes of all of some fields of packets.
+macro_rules! copy_lane {
+    ($to:expr, $at:expr, $from:expr, $lane:expr; $($field:ident).+ $(, $($rest:ident).+)*) => {
+        $to.$($field).+.0[$at] = $from.$($field).+.0[$lane];
+        $(copy_lane!($to, $at, $from, $lane; $($rest).+);)*
+    };
+}
+
+impl Packet {
+    /// Copies one lane of another packet.
+    #[inline(always)]
+    fn copy(&mut self, to: usize, from: &Self, lane: usize) {
+        copy_lane!(self, to, from, lane; rays.origin.x, rays.origin.y, rays.origin.z);
+        copy_lane!(self, to, from, lane; rays.direction.x, rays.direction.y, rays.direction.z, rays.t_far);
+        copy_lane!(self, to, from, lane; throughput.x, throughput.y, throughput.z, eta, pdf, smooth);
+        copy_lane!(self, to, from, lane; from.x, from.y, from.z, id, hash, parent);
+    }
+}
+
+/// Paths in an order of their own.
+#[derive(Default)]
+pub struct Order {
+    /// Hits of the paths' rays.
+    pub hits: Vec<Hits>,
+    /// Indices of the paths.
+    indices: Vec<u32>,
+}
+
+impl Order {
+    /// Puts paths of one key together, by their hits. Keys are at most `last`, which no path is moved for. Returns false
+    /// where the paths had better stay where they are, since they have a single key besides.
+    pub fn sort(&mut self, count: usize, last: usize, key: impl Fn(&Hits, usize) -> usize) -> bool {
+        let key = |index: usize| key(&self.hits[index / LANES], index % LANES);
+        let mut starts = vec![0u32; last + 2];
+        (0..count).for_each(|index| starts[key(index) + 1] += 1);
+        if starts[1..=last].iter().filter(|&&count| count > 0).count() < 2 {
+            return false;
+        }
+        (1..starts.len()).for_each(|k| starts[k] += starts[k - 1]);
+        self.indices.resize(count, 0);
+        for index in 0..count {
+            let start = &mut starts[key(index)];
+            self.indices[*start as usize] = index as u32;
+            *start += 1;
+        }
+        true
+    }
+
+    /// Gathers the paths of packet number `packet`, with their hits.
+    pub fn gather(&self, packet: usize, paths: &Paths, to: &mut (Packet, Hits)) {
+        let indices = self.indices.iter().skip(packet * LANES).take(LANES);
+        for (lane, &index) in indices.enumerate() {
+            let (from, at) = (index as usize / LANES, index as usize % LANES);
+            to.0.copy(lane, &paths.packets[from], at);
+            to.1.copy(lane, &self.hits[from], at);
+        }
+    }
 }
 
 /// Any number of paths.

@@ -71,6 +71,14 @@ impl PathRecord {
         }
     }
 
+    /// Says where the vertices of level `at` lead to: `packet` becomes the vertices from number `first` on of the next level.
+    pub fn link(&mut self, at: usize, packet: &Packet, active: Mask, first: u32) {
+        for lane in active.lanes() {
+            let parent = packet.parent.0[lane] as usize;
+            self.levels[at][parent / LANES].next.0[parent % LANES] = first + lane as u32;
+        }
+    }
+
     /// Marks the samples of paths that have met something, be it the environment.
     pub fn cover(&mut self, packet: &Packet, lanes: Mask) {
         lanes.lanes().for_each(|lane| self.samples[packet.id.0[lane] as usize].alpha = 1.0);

@@ -2,13 +2,15 @@
 
 use super::camera::CameraSamples;
 use super::continuation::shade;
-use super::paths::Paths;
+use super::Sampler;
+use super::paths::{Order, Packet, Paths};
 use super::record::PathRecord;
 use super::vertices::Vertices;
-use super::{Sampler, paths};
+use crate::ffi::embree::Hits;
 use crate::film::Needs;
 use crate::math::lanes::{LANES, Lanes, Lanes3, Mask};
 use crate::math::{Rgb, Vec2};
+use crate::scene::closure::KINDS;
 use crate::scene::{Integrator, Scene};
 
 /// Traces waves of paths; keeps its memory between them.
@@ -18,12 +20,13 @@ pub struct PathTracer<'a> {
     needs: Needs,
     paths: Paths,
     next: Paths,
+    order: Order,
 }
 
 impl<'a> PathTracer<'a> {
     /// A tracer that computes what a film with these needs records.
     pub fn new(scene: &'a Scene, needs: Needs) -> Self {
-        Self { scene, needs, paths: Paths::default(), next: Paths::default() }
+        Self { scene, needs, paths: Paths::default(), next: Paths::default(), order: Order::default() }
     }
 
     /// Traces paths from `step` pixels beside the camera samples. `keep_all`: record the vertices of all depths instead of
@@ -59,18 +62,33 @@ impl<'a> PathTracer<'a> {
         }
     }
 
-    /// Takes all paths to their next vertices, which become level `at` of the record, and scatters them there.
+    /// Takes all paths to their next vertices, which become level `at` of the record, and scatters them there. Behind the
+    /// camera's surfaces, paths are sorted by the kinds of material that they have come to.
     fn advance(&mut self, sampler: Sampler, depth: u32, (at, keep_all): (usize, bool), record: &mut PathRecord) {
-        let Self { scene, needs, paths, next, .. } = self;
+        let Self { scene, needs, paths, next, order } = self;
         if record.levels.len() == at {
             record.levels.push(Vec::new());
         }
         let mut level = std::mem::take(&mut record.levels[at]);
         level.resize_with(level.len().max(paths.len().div_ceil(LANES)), Vertices::default);
         next.clear();
+        order.hits.clear();
+        let hits = paths.packets().map(|(packet, active)| scene.hits_of_packet(&packet.rays, active, depth == 0));
+        order.hits.extend(hits);
+        let sorted = depth > 0 && order.sort(paths.len(), KINDS, |hits, lane| scene.kind_of_hit(hits, lane));
+        let mut gathered = (Packet::EMPTY, Hits::NONE);
         for (k, (packet, active)) in paths.packets().enumerate() {
             let vertices = &mut level[k];
-            arrive((scene, *needs), depth, (packet, active), (vertices, keep_all.then_some(at)), record);
+            let (packet, hits) = if sorted {
+                order.gather(k, paths, &mut gathered);
+                if keep_all {
+                    record.link(at - 1, &gathered.0, active, (k * LANES) as u32);
+                }
+                (&gathered.0, &gathered.1)
+            } else {
+                (packet, &order.hits[k])
+            };
+            arrive((scene, *needs), depth, (packet, hits, active), (vertices, keep_all.then_some(at)), record);
             if !vertices.hit.any() {
                 continue;
             }
@@ -92,17 +110,17 @@ fn describes(needs: Needs) -> bool {
     needs.features || needs.occlusion || needs.position
 }
 
-/// Intersects the active paths of a packet, records emission and features, and leaves in `vertices.hit` the surfaces that
+/// Completes the hits of the active paths of a packet, records emission and features, and leaves in `vertices.hit` the surfaces that
 /// paths may scatter at.
 fn arrive(
     (scene, needs): (&Scene, Needs),
     depth: u32,
-    (packet, active): (&paths::Packet, Mask),
+    (packet, hits, active): (&Packet, &Hits, Mask),
     (vertices, recorded): (&mut Vertices, Option<usize>),
     record: &mut PathRecord,
 ) {
     let Integrator { max_depth, hide_emitters, pass_emitters, .. } = scene.integrator();
-    let mut hit = scene.intersect_packet(&packet.rays, active, depth == 0, &mut vertices.surfaces);
+    let mut hit = scene.surfaces_of_packet(&packet.rays, hits, active, &mut vertices.surfaces);
     if depth == 0 && pass_emitters {
         scene.pass_emitters(&packet.rays, &mut hit, &mut vertices.surfaces);
     }

@@ -1,10 +1,12 @@
 //! Vertices of sixteen paths: surface, next-event sample and scattered direction.
 
 use crate::math::lanes::{Bits, Lanes, Lanes3, Mask};
-use crate::scene::packet::{Evals, Lights, Materials, Scatters, Surfaces};
+use crate::scene::closure::{Evals, Scatters};
+use crate::scene::packet::{Lights, Materials, Surfaces};
 
 /// Sixteen vertices of as many paths.
 #[derive(Clone)]
+#[repr(align(64))]
 pub struct Vertices {
     /// Lanes that have hit a surface that they may scatter at.
     pub hit: Mask,
@@ -38,6 +40,7 @@ pub struct Vertices {
 
 /// Emitter points sampled by next-event estimation.
 #[derive(Clone)]
+#[repr(align(64))]
 pub struct Light {
     /// The points.
     pub points: Lights,
@@ -53,6 +56,7 @@ pub struct Light {
 
 /// Emitters that paths have hit by scattering.
 #[derive(Clone)]
+#[repr(align(64))]
 pub struct Emission {
     /// The points that were hit.
     pub points: Lights,
@@ -73,7 +77,7 @@ impl Default for Vertices {
             materials: Materials::default(),
             throughput: zero3,
             lit: Mask::NONE,
-            light: Light { points: points.clone(), radiance: zero3, wo: zero3, evals: Evals::default(), pdf: zero },
+            light: Light { points: points.clone(), radiance: zero3, wo: zero3, evals: Evals::ZERO, pdf: zero },
             scattered: Mask::NONE,
             passed: Mask::NONE,
             scatters: Scatters::default(),

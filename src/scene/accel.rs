@@ -98,6 +98,15 @@ impl Accel {
         Mask(self.scene.occluded_packet(&rays))
     }
 
+    /// Index of a shape that was hit, among all.
+    #[inline(always)]
+    pub fn shape_of(&self, geometry: u32, instance: u32) -> usize {
+        match instance {
+            u32::MAX => geometry as usize,
+            _ => (self.placements[(instance - self.first_placement) as usize].first_shape + geometry) as usize,
+        }
+    }
+
     /// The surface of a hit, of one of all shapes.
     #[inline]
     pub fn surface(&self, shapes: &[Shape], hit: &Hit, ray: Ray) -> Surface {

@@ -3,6 +3,7 @@
 
 pub mod accel;
 pub mod bsdf;
+pub mod closure;
 pub mod emitter;
 pub mod load;
 pub mod packet;

@@ -9,6 +9,8 @@ pub struct SceneStats {
     pub shapes: usize,
     /// Shapes whose material is a diffuse lobe and nothing else.
     pub diffuse: usize,
+    /// Shapes whose material packets evaluate.
+    pub closing: usize,
     /// Shapes whose texture coordinates are used.
     pub textured: usize,
     /// Shapes whose material perturbs shading normals, which needs derivatives of the surface.
@@ -25,7 +27,8 @@ impl Scene {
         let count = |test: fn(&super::ShapeInfo) -> bool| self.shape_infos.iter().filter(|info| test(info)).count();
         SceneStats {
             shapes: self.shapes.len(),
-            diffuse: count(|info| info.lambert),
+            diffuse: count(|info| info.diffuse),
+            closing: count(|info| info.closes),
             textured: count(|info| info.uv),
             perturbed: self.shapes.iter().filter(|shape| shape.bsdf.needs_derivatives()).count(),
             emitters: self.emitters.len(),
@@ -37,7 +40,7 @@ impl Scene {
     /// slower.
     pub fn disable_fast_paths(&mut self) {
         for info in &mut self.shape_infos {
-            (info.lambert, info.uv) = (false, true);
+            (info.closes, info.closure, info.uv) = (false, None, true);
         }
     }
 }

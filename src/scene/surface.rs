@@ -24,6 +24,15 @@ pub struct Surface {
     pub wi: Vec3,
 }
 
+impl Default for Surface {
+    /// A point of the plane z = 0 at the origin, seen from above.
+    fn default() -> Self {
+        let (zero, up) = (Vec3::ZERO, Vec3::Z);
+        let frame = Frame { s: Vec3::X, t: Vec3::Y, n: up };
+        Self { p: zero, n: up, frame, at: texture::Point::default(), dp_du: zero, dp_dv: zero, epsilon: 0.0, wi: up }
+    }
+}
+
 /// Distance at which rays start off a surface, per size of coordinate. Far more than rounding asks for: scenes
 /// are modelled with doubled and nearly coincident surfaces, and look right only in renderers that skip the
 /// second one, as Mitsuba does at this distance.

@@ -87,7 +87,7 @@ impl Patches {
             for (&radius, rows) in radii.iter().zip(&mut self.rows) {
                 for x in (0..width).step_by(LANES) {
                     let from = &self.distance[x + self.reach - radius..];
-                    let sum = (1..2 * radius + 1).fold(Lanes::load(from), |sum, k| sum + Lanes::load(&from[k..]));
+                    let sum = (1..2 * radius + 1).fold(<Lanes>::load(from), |sum, k| sum + Lanes::load(&from[k..]));
                     sum.store(&mut rows[row * width + x..]);
                 }
             }

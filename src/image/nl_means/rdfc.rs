@@ -87,6 +87,7 @@ fn denoise_band(guides: &Guides, options: Options) -> Denoised {
 
 /// Sums of one filter over the windows of some pixels.
 #[derive(Clone, Copy)]
+#[repr(align(64))]
 struct Sums {
     weight: Lanes,
     largest: Lanes,
@@ -107,6 +108,7 @@ const EMPTY: Sums = Sums {
 };
 
 /// A pixel of the window, seen from the centre.
+#[repr(align(64))]
 struct Neighbour {
     step: [Lanes; 3],
     square: Lanes,

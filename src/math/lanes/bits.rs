@@ -1,20 +1,19 @@
-//! Sixteen unsigned integers as a vector.
+//! Unsigned integers as a vector.
 
 use super::{LANES, Lanes, Mask};
 
 /// The integers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(align(64))]
-pub struct Bits(pub [u32; LANES]);
+pub struct Bits<const N: usize = LANES>(pub [u32; N]);
 
-impl Bits {
+impl<const N: usize> Bits<N> {
     /// All zero.
-    pub const ZERO: Self = Self([0; LANES]);
+    pub const ZERO: Self = Self([0; N]);
 
     /// The same value everywhere.
     #[inline(always)]
     pub fn splat(value: u32) -> Self {
-        Self([value; LANES])
+        Self([value; N])
     }
 
     /// A function of every one.
@@ -39,14 +38,14 @@ impl Bits {
 
     /// Mask of the lanes that equal a value.
     #[inline(always)]
-    pub fn equal(self, value: u32) -> Mask {
+    pub fn equal(self, value: u32) -> Mask<N> {
         Mask(self.map(|lane| if lane == value { !0 } else { 0 }).0)
     }
 
     /// The top 24 bits as floats in [0, 1).
     #[inline(always)]
-    pub fn unit(self) -> Lanes {
-        let mut out = [0.0; LANES];
+    pub fn unit(self) -> Lanes<N> {
+        let mut out = [0.0; N];
         for (value, bits) in out.iter_mut().zip(self.0) {
             *value = (bits >> 8) as f32 * (1.0 / 16_777_216.0);
         }

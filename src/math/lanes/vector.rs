@@ -1,22 +1,22 @@
-//! Sixteen vectors or colours, coordinate by coordinate.
+//! Several vectors or colours, coordinate by coordinate.
 
 use std::ops::{Add, AddAssign, Mul, Neg, Sub};
 
-use super::{Lanes, Mask};
+use super::{LANES, Lanes, Mask};
 use crate::math::{Vec3, vec3};
 
 /// The vectors, by coordinate.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Lanes3 {
+pub struct Lanes3<const N: usize = LANES> {
     /// First coordinates.
-    pub x: Lanes,
+    pub x: Lanes<N>,
     /// Second coordinates.
-    pub y: Lanes,
+    pub y: Lanes<N>,
     /// Third coordinates.
-    pub z: Lanes,
+    pub z: Lanes<N>,
 }
 
-impl Lanes3 {
+impl<const N: usize> Lanes3<N> {
     /// All zero.
     pub const ZERO: Self = Self { x: Lanes::ZERO, y: Lanes::ZERO, z: Lanes::ZERO };
 
@@ -38,9 +38,39 @@ impl Lanes3 {
         (self.x.0[lane], self.y.0[lane], self.z.0[lane]) = value.into();
     }
 
+    /// All one.
+    pub const ONE: Self = Self { x: Lanes::ONE, y: Lanes::ONE, z: Lanes::ONE };
+
+    /// The normals of flat surfaces in their own frames.
+    pub const UP: Self = Self { x: Lanes::ZERO, y: Lanes::ZERO, z: Lanes::ONE };
+
+    /// The same colour in all channels.
+    #[inline(always)]
+    pub fn grey(value: Lanes<N>) -> Self {
+        Self { x: value, y: value, z: value }
+    }
+
+    /// Part way to another.
+    #[inline(always)]
+    pub fn lerp(self, other: Self, share: Lanes<N>) -> Self {
+        self + (other - self) * share
+    }
+
+    /// A function of every coordinate.
+    #[inline(always)]
+    pub fn map(self, f: impl Fn(Lanes<N>) -> Lanes<N>) -> Self {
+        Self { x: f(self.x), y: f(self.y), z: f(self.z) }
+    }
+
+    /// The vectors seen from the other sides of their surfaces, in the given lanes.
+    #[inline(always)]
+    pub fn mirror(self, lanes: Mask<N>) -> Self {
+        Self { z: lanes.select(-self.z, self.z), ..self }
+    }
+
     /// Inner products.
     #[inline(always)]
-    pub fn dot(self, other: Self) -> Lanes {
+    pub fn dot(self, other: Self) -> Lanes<N> {
         self.x * other.x + self.y * other.y + self.z * other.z
     }
 
@@ -70,7 +100,7 @@ impl Lanes3 {
 
     /// Largest coordinates.
     #[inline(always)]
-    pub fn max_element(self) -> Lanes {
+    pub fn max_element(self) -> Lanes<N> {
         self.x.max(self.y).max(self.z)
     }
 
@@ -82,12 +112,12 @@ impl Lanes3 {
 
     /// Mask of the lanes with a coordinate other than zero.
     #[inline(always)]
-    pub fn nonzero(self) -> Mask {
+    pub fn nonzero(self) -> Mask<N> {
         self.abs().max_element().greater(Lanes::ZERO)
     }
 }
 
-impl Add for Lanes3 {
+impl<const N: usize> Add for Lanes3<N> {
     type Output = Self;
     #[inline(always)]
     fn add(self, other: Self) -> Self {
@@ -95,14 +125,14 @@ impl Add for Lanes3 {
     }
 }
 
-impl AddAssign for Lanes3 {
+impl<const N: usize> AddAssign for Lanes3<N> {
     #[inline(always)]
     fn add_assign(&mut self, other: Self) {
         *self = *self + other;
     }
 }
 
-impl Sub for Lanes3 {
+impl<const N: usize> Sub for Lanes3<N> {
     type Output = Self;
     #[inline(always)]
     fn sub(self, other: Self) -> Self {
@@ -110,7 +140,7 @@ impl Sub for Lanes3 {
     }
 }
 
-impl Neg for Lanes3 {
+impl<const N: usize> Neg for Lanes3<N> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
@@ -118,10 +148,10 @@ impl Neg for Lanes3 {
     }
 }
 
-impl Mul<Lanes> for Lanes3 {
+impl<const N: usize> Mul<Lanes<N>> for Lanes3<N> {
     type Output = Self;
     #[inline(always)]
-    fn mul(self, factor: Lanes) -> Self {
+    fn mul(self, factor: Lanes<N>) -> Self {
         Self { x: self.x * factor, y: self.y * factor, z: self.z * factor }
     }
 }
@@ -133,7 +163,7 @@ mod tests {
     #[test]
     fn vectors_are_as_single_ones() {
         let (a, b) = (vec3(1.0, -2.0, 0.5), vec3(0.25, 3.0, -1.0));
-        let (many_a, many_b) = (Lanes3::splat(a), Lanes3::splat(b));
+        let (many_a, many_b) = (<Lanes3>::splat(a), <Lanes3>::splat(b));
         assert_eq!((many_a + many_b).get(3), a + b);
         assert_eq!((many_a - many_b).get(4), a - b);
         assert_eq!((-many_a * Lanes::splat(2.0)).get(4), a * -2.0);
@@ -141,9 +171,9 @@ mod tests {
         assert_eq!(many_a.scale(many_b).get(6), a * b);
         assert_eq!((many_a.dot(many_b).0[7], many_a.abs().max_element().0[8]), (a.dot(b), 2.0));
         assert!(many_a.normalize_or(many_b).get(9).distance(a.normalize()) < 1e-6);
-        assert_eq!(Lanes3::ZERO.normalize_or(many_b).get(10), b);
-        assert!(many_a.nonzero().get(0) && !Lanes3::ZERO.nonzero().any());
-        let mut one = Lanes3::ZERO;
+        assert_eq!(<Lanes3>::ZERO.normalize_or(many_b).get(10), b);
+        assert!(many_a.nonzero().get(0) && !<Lanes3>::ZERO.nonzero().any());
+        let mut one = <Lanes3>::ZERO;
         one.set(2, a);
         assert_eq!((one.get(1), one.get(2)), (Vec3::ZERO, a));
     }

@@ -38,4 +38,8 @@ impl NormalMap for Bumps {
         let perturbed = du.cross(dv).normalize_or(n);
         surface.frame.to_local(perturbed * 1f32.copysign(surface.n.dot(perturbed)))
     }
+
+    fn texture(&self) -> &dyn Texture {
+        &*self.height
+    }
 }

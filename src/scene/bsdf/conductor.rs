@@ -2,13 +2,15 @@
 
 use std::sync::Arc;
 
-use super::{Bsdf, BsdfSample, Delta, Eval, Lobe, ior, metals};
+use super::{Bsdf, Whole, ior, metals};
 use crate::error::Result;
-use crate::math::{Rgb, Vec2, Vec3, fresnel, vec3};
+use crate::math::lanes::Lanes3;
+use crate::math::{Rgb, fresnel};
 use crate::scene::Surface;
+use crate::scene::closure::{self, Closure};
 use crate::scene::load::props::Object;
 use crate::scene::load::{Loader, Plugin};
-use crate::scene::texture::Texture;
+use crate::scene::texture::{Point, Texture};
 
 /// `conductor`.
 pub const PLUGIN: Plugin<Arc<dyn Bsdf>> =
@@ -37,9 +39,20 @@ impl Metal {
         Ok(Self { eta, k, reflectance: loader.texture(object, "specular_reflectance", Rgb::ONE)? })
     }
 
-    /// Reflectance at a cosine.
-    pub fn reflectance(&self, surface: &Surface, cos: f32) -> Rgb {
-        fresnel::conductor(cos, self.eta, self.k) * self.reflectance.color(&surface.at)
+    /// Colour at normal incidence.
+    pub fn albedo(&self, surface: &Surface) -> Rgb {
+        let reflectance = fresnel::conductor(1.0, self.eta, self.k) * self.reflectance.color(&surface.at);
+        reflectance.clamp(Rgb::ZERO, Rgb::ONE)
+    }
+
+    /// Complex index of refraction and factor at a surface point.
+    pub fn at(&self, at: &Point) -> [Lanes3<1>; 3] {
+        [self.eta, self.k, self.reflectance.color(at)].map(Lanes3::splat)
+    }
+
+    /// The factor.
+    pub fn texture(&self) -> &dyn Texture {
+        &*self.reflectance
     }
 }
 
@@ -48,29 +61,16 @@ struct Conductor {
 }
 
 impl Bsdf for Conductor {
-    fn sample(&self, surface: &Surface, wi: Vec3, _lobe: f32, _u: Vec2) -> Option<BsdfSample> {
-        let Delta { wo, value, .. } = self.delta(surface, wi, Lobe::DeltaReflect)?;
-        Some(BsdfSample { wo, weight: value, pdf: 1.0, lobe: Lobe::DeltaReflect, eta: 1.0 })
+    fn closure(&self, at: &Point, _surface: Whole) -> Option<Closure> {
+        let [eta, k, tint] = self.metal.at(at);
+        Some(closure::Conductor { eta, k, tint }.closure(None))
     }
 
-    fn eval(&self, _surface: &Surface, _wi: Vec3, _wo: Vec3) -> Eval {
-        Eval::default()
-    }
-
-    fn delta(&self, surface: &Surface, wi: Vec3, lobe: Lobe) -> Option<Delta> {
-        let happens = wi.z > 0.0 && lobe == Lobe::DeltaReflect;
-        happens.then(|| Delta {
-            wo: fresnel::reflect(wi),
-            value: self.metal.reflectance(surface, wi.z),
-            probability: 1.0,
-        })
-    }
-
-    fn roughness(&self, _surface: &Surface) -> Option<f32> {
-        None
+    fn textures(&self) -> Vec<&dyn Texture> {
+        vec![self.metal.texture()]
     }
 
     fn albedo(&self, surface: &Surface) -> Rgb {
-        self.metal.reflectance(surface, 1.0).clamp(vec3(0.0, 0.0, 0.0), Rgb::ONE)
+        self.metal.albedo(surface)
     }
 }

@@ -2,13 +2,15 @@
 
 use std::sync::Arc;
 
-use super::{BK7, Bsdf, BsdfSample, Delta, Eval, Lobe, relative_ior};
+use super::{BK7, Bsdf, Whole, relative_ior};
 use crate::error::Result;
-use crate::math::{Rgb, Vec2, Vec3, fresnel};
+use crate::math::Rgb;
+use crate::math::lanes::{Lanes, Lanes3};
 use crate::scene::Surface;
+use crate::scene::closure::{self, Closure};
 use crate::scene::load::props::Object;
 use crate::scene::load::{Loader, Plugin};
-use crate::scene::texture::Texture;
+use crate::scene::texture::{Point, Texture};
 
 /// `dielectric`.
 pub const PLUGIN: Plugin<Arc<dyn Bsdf>> = Plugin {
@@ -32,42 +34,14 @@ struct Dielectric {
 }
 
 impl Bsdf for Dielectric {
-    fn sample(&self, surface: &Surface, wi: Vec3, lobe: f32, _u: Vec2) -> Option<BsdfSample> {
-        let reflectance = fresnel::dielectric(wi.z, self.eta).reflectance;
-        let lobe = if lobe < reflectance { Lobe::DeltaReflect } else { Lobe::DeltaTransmit };
-        let Delta { wo, value, probability } = self.delta(surface, wi, lobe)?;
-        let eta = match lobe {
-            Lobe::DeltaTransmit if wi.z > 0.0 => self.eta,
-            Lobe::DeltaTransmit => 1.0 / self.eta,
-            _ => 1.0,
-        };
-        Some(BsdfSample { wo, weight: value / probability, pdf: probability, lobe, eta })
+    fn closure(&self, at: &Point, _surface: Whole) -> Option<Closure> {
+        let [reflectance, transmittance] =
+            [&self.reflectance, &self.transmittance].map(|factor| Lanes3::splat(factor.color(at)));
+        Some(closure::Dielectric { eta: Lanes([self.eta]), reflectance, transmittance }.closure(None))
     }
 
-    fn eval(&self, _surface: &Surface, _wi: Vec3, _wo: Vec3) -> Eval {
-        Eval::default()
-    }
-
-    fn delta(&self, surface: &Surface, wi: Vec3, lobe: Lobe) -> Option<Delta> {
-        if wi.z == 0.0 {
-            return None;
-        }
-        let found = fresnel::dielectric(wi.z, self.eta);
-        let (wo, tint, probability, scale) = match lobe {
-            Lobe::DeltaReflect => (fresnel::reflect(wi), &self.reflectance, found.reflectance, 1.0),
-            // Radiance is squeezed into the cone that it is refracted into.
-            Lobe::DeltaTransmit => {
-                let wo = fresnel::refract(wi, found.cos_t, found.eta_ti);
-                (wo, &self.transmittance, 1.0 - found.reflectance, found.eta_ti * found.eta_ti)
-            }
-            _ => return None,
-        };
-        let value = tint.color(&surface.at) * (probability * scale);
-        (probability > 0.0).then_some(Delta { wo, value, probability })
-    }
-
-    fn roughness(&self, _surface: &Surface) -> Option<f32> {
-        None
+    fn textures(&self) -> Vec<&dyn Texture> {
+        vec![&*self.reflectance, &*self.transmittance]
     }
 
     fn albedo(&self, surface: &Surface) -> Rgb {

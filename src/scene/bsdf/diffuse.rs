@@ -1,15 +1,16 @@
 //! Lambert's law, on the outside only.
 
-use std::f32::consts::FRAC_1_PI;
 use std::sync::Arc;
 
-use super::{Bsdf, BsdfSample, Eval, Lambert, Lobe};
+use super::{Bsdf, Whole};
 use crate::error::Result;
-use crate::math::{Rgb, Vec2, Vec3, warp};
+use crate::math::Rgb;
+use crate::math::lanes::Lanes3;
 use crate::scene::Surface;
+use crate::scene::closure::{self, Closure};
 use crate::scene::load::props::Object;
 use crate::scene::load::{Loader, Plugin};
-use crate::scene::texture::{Constant, Texture};
+use crate::scene::texture::{Constant, Point, Texture};
 
 /// `diffuse`.
 pub const PLUGIN: Plugin<Arc<dyn Bsdf>> = Plugin { name: "diffuse", parameters: "reflectance = 0.5", make };
@@ -28,29 +29,13 @@ struct Diffuse {
 }
 
 impl Bsdf for Diffuse {
-    fn sample(&self, surface: &Surface, wi: Vec3, _lobe: f32, u: Vec2) -> Option<BsdfSample> {
-        let wo = warp::cosine_hemisphere(u);
-        if wi.z <= 0.0 || wo.z <= 0.0 {
-            return None;
-        }
-        let weight = self.reflectance.color(&surface.at);
-        Some(BsdfSample { wo, weight, pdf: warp::cosine_hemisphere_pdf(wo.z), lobe: Lobe::Smooth, eta: 1.0 })
+    fn closure(&self, at: &Point, _surface: Whole) -> Option<Closure> {
+        let reflectance = Lanes3::splat(self.reflectance.color(at));
+        Some(closure::Diffuse { reflectance }.closure(Some(f32::INFINITY)))
     }
 
-    fn eval(&self, surface: &Surface, wi: Vec3, wo: Vec3) -> Eval {
-        if wi.z <= 0.0 || wo.z <= 0.0 {
-            return Eval::default();
-        }
-        let value = self.reflectance.color(&surface.at) * (FRAC_1_PI * wo.z);
-        Eval { value, pdf: warp::cosine_hemisphere_pdf(wo.z) }
-    }
-
-    fn lambert(&self) -> Option<Lambert> {
-        Some(Lambert { reflectance: Arc::clone(&self.reflectance), two_sided: false })
-    }
-
-    fn roughness(&self, _surface: &Surface) -> Option<f32> {
-        Some(f32::INFINITY)
+    fn textures(&self) -> Vec<&dyn Texture> {
+        vec![&*self.reflectance]
     }
 
     fn albedo(&self, surface: &Surface) -> Rgb {

@@ -2,13 +2,14 @@
 
 use std::sync::Arc;
 
-use super::{Bsdf, BsdfSample, Delta, Eval, Lobe};
+use super::{Bsdf, BsdfSample, Delta, Eval, Lobe, Whole};
 use crate::error::Result;
 use crate::math::{Rgb, Vec2, Vec3};
 use crate::scene::Surface;
+use crate::scene::closure::Closure;
 use crate::scene::load::props::Object;
 use crate::scene::load::{Loader, Plugin};
-use crate::scene::texture::Texture;
+use crate::scene::texture::{Point, Texture};
 
 /// `mask`. Shadow rays do not pass it: emitters behind it are hit by the paths that do.
 pub const PLUGIN: Plugin<Arc<dyn Bsdf>> = Plugin { name: "mask", parameters: "opacity = 0.5, one nested bsdf", make };
@@ -30,6 +31,14 @@ impl Masked {
 }
 
 impl Bsdf for Masked {
+    fn closure(&self, at: &Point, surface: Whole) -> Option<Closure> {
+        self.nested.closure(at, surface)?.with_holes(self.opacity.scalar(at).clamp(0.0, 1.0))
+    }
+
+    fn textures(&self) -> Vec<&dyn Texture> {
+        self.nested.textures().into_iter().chain([&*self.opacity]).collect()
+    }
+
     fn sample(&self, surface: &Surface, wi: Vec3, lobe: f32, u: Vec2) -> Option<BsdfSample> {
         let opacity = self.opacity(surface);
         if lobe < opacity {

@@ -1,17 +1,16 @@
-//! Microfacet distributions: Beckmann and GGX with sampling of visible normals.
-//!
-//! Walter et al. 2007 for the distributions and Smith's shadowing; Heitz and d'Eon 2014 for visible normals.
+//! Microfacet distributions of materials: parameters, and integrals over them.
 
-use std::f32::consts::FRAC_1_PI;
 use std::sync::Arc;
 
 use crate::error::Result;
+use crate::math::fresnel::lanes as fresnel;
+use crate::math::lanes::{LANES, Lanes, Lanes3, Mask};
 use crate::math::quadrature::gauss_legendre;
-use crate::math::{Rgb, Vec2, Vec3, vec2, vec3, warp};
-use crate::scene::Surface;
+use crate::math::{Rgb, Vec2, Vec3, vec2, vec3};
+use crate::scene::closure::facets::{Facets, Ggx, Transmittance};
 use crate::scene::load::Loader;
 use crate::scene::load::props::Object;
-use crate::scene::texture::Texture;
+use crate::scene::texture::{Point, Texture};
 
 /// Smaller roughness than this is indistinguishable from smooth and numerically unsafe.
 const MIN_ALPHA: f32 = 1e-4;
@@ -59,10 +58,15 @@ impl Roughness {
     }
 
     /// The distribution at a surface point.
-    pub fn at(&self, surface: &Surface) -> Microfacet {
-        let u = self.u.scalar(&surface.at);
-        let v = self.v.as_ref().map_or(u, |v| v.scalar(&surface.at));
+    pub fn at(&self, at: &Point) -> Microfacet {
+        let u = self.u.scalar(at);
+        let v = self.v.as_ref().map_or(u, |v| v.scalar(at));
         Microfacet::anisotropic(self.kind, vec2(u, v))
+    }
+
+    /// The textures that it is read from.
+    pub fn textures(&self) -> impl Iterator<Item = &dyn Texture> {
+        [Some(&self.u), self.v.as_ref()].into_iter().flatten().map(|texture| &**texture)
     }
 
     /// Whether the tangents matter.
@@ -99,181 +103,90 @@ impl Microfacet {
         self.alpha.min_element()
     }
 
-    /// Density of facet normals `m` per solid angle of normal, per projected area: ∫ D cos θ dω = 1.
+    /// The distribution as closures have it.
+    pub fn facets(&self) -> Facets<1> {
+        let ggx = Mask([if self.kind == Kind::Ggx { !0 } else { 0 }]);
+        Facets { ggx, alpha: [Lanes([self.alpha.x]), Lanes([self.alpha.y])] }
+    }
+
+    /// The same, where it is known to be [`Kind::Ggx`].
+    pub fn ggx(&self) -> Ggx<1> {
+        Ggx { alpha: self.facets().alpha }
+    }
+
+    /// [`Facets::d`].
     pub fn d(&self, m: Vec3) -> f32 {
-        if m.z <= 0.0 {
-            return 0.0;
-        }
-        let (a2, cos2) = (self.alpha.x * self.alpha.y, m.z * m.z);
-        let slope2 = (m.truncate() / self.alpha).length_squared();
-        let value = match self.kind {
-            Kind::Beckmann => (-slope2 / cos2).exp() * FRAC_1_PI / (a2 * cos2 * cos2),
-            Kind::Ggx => FRAC_1_PI / (a2 * (slope2 + cos2) * (slope2 + cos2)),
-        };
-        // Far out in the tail the products below would be denormal.
-        if value * m.z > 1e-20 { value } else { 0.0 }
+        self.facets().d(Lanes3::splat(m)).0[0]
     }
 
-    /// Smith's masking of facets `m` along `v`. Beckmann uses the rational fit of Walter et al.
+    /// [`Facets::g1`].
     pub fn g1(&self, v: Vec3, m: Vec3) -> f32 {
-        if v.dot(m) * v.z <= 0.0 {
-            return 0.0;
-        }
-        let tan2 = (v.truncate() * self.alpha).length_squared() / (v.z * v.z);
-        if tan2 == 0.0 {
-            return 1.0;
-        }
-        match self.kind {
-            Kind::Beckmann => {
-                let a = 1.0 / tan2.sqrt();
-                if a >= 1.6 { 1.0 } else { (3.535 * a + 2.181 * a * a) / (1.0 + 2.276 * a + 2.577 * a * a) }
-            }
-            Kind::Ggx => 2.0 / (1.0 + (1.0 + tan2).sqrt()),
-        }
+        self.facets().g1(Lanes3::splat(v), Lanes3::splat(m)).0[0]
     }
 
-    /// Density of the mirror direction of `wi` about a visible normal `m`: D G1(wi) / 4 cos θi.
+    /// [`Facets::reflect_pdf`].
     pub fn reflect_pdf(&self, wi: Vec3, m: Vec3) -> f32 {
-        self.d(m) * self.g1(wi, m) / (4.0 * wi.z)
+        self.facets().reflect_pdf(Lanes3::splat(wi), Lanes3::splat(m)).0[0]
     }
 
-    /// Density of [`Microfacet::sample_visible`] per solid angle of normal.
-    pub fn visible_pdf(&self, wi: Vec3, m: Vec3) -> f32 {
-        self.d(m) * self.g1(wi, m) * (wi.dot(m) / wi.z).abs()
-    }
-
-    /// A normal in proportion to its visible area from `wi` (wi.z > 0); density D G1 wi·m / cos θi.
+    /// [`Facets::sample_visible`].
     pub fn sample_visible(&self, wi: Vec3, u: Vec2) -> Vec3 {
-        let stretched = (self.alpha * wi.truncate()).extend(wi.z).normalize();
-        let sin = vec2(stretched.x, stretched.y).length();
-        let (cos_phi, sin_phi) = if sin > 0.0 { (stretched.x / sin, stretched.y / sin) } else { (1.0, 0.0) };
-        let slope = match self.kind {
-            Kind::Beckmann => beckmann_slope(stretched.z, sin, u),
-            Kind::Ggx => ggx_slope(stretched.z, sin, u),
-        };
-        let turned = vec2(cos_phi * slope.x - sin_phi * slope.y, sin_phi * slope.x + cos_phi * slope.y);
-        (-self.alpha * turned).extend(1.0).normalize()
+        self.facets().sample_visible(Lanes3::splat(wi), [Lanes([u.x]), Lanes([u.y])]).get(0)
     }
 }
 
-/// Slope of a visible normal of the unit GGX surface, from the visible disk of a hemisphere (Heitz 2018).
-fn ggx_slope(cos: f32, sin: f32, u: Vec2) -> Vec2 {
-    let mut p = warp::disk(u);
-    let height = (1.0 - p.x * p.x).max(0.0).sqrt();
-    let share = 0.5 * (1.0 + cos);
-    p.y = height * (1.0 - share) + p.y * share;
-    let z = (1.0 - p.length_squared()).max(0.0).sqrt();
-    let scale = 1.0 / (sin * p.y + cos * z).max(1e-12);
-    vec2(cos * p.y - sin * z, p.x) * scale
-}
-
-/// Slope of a visible normal of the unit Beckmann surface: the slope along the view is found by inverting its
-/// distribution with Newton steps inside a bracket, the one across is Gaussian.
-fn beckmann_slope(cos: f32, sin: f32, u: Vec2) -> Vec2 {
-    let u = u.clamp(Vec2::splat(1e-6), Vec2::splat(1.0 - 1e-6));
-    let across = erf_inv(2.0 * u.y - 1.0);
-    let (cos, sin) = (f64::from(cos), f64::from(sin));
-    // P(slope < x) is proportional to the visible area below x: the integral of (cos - s sin) exp(-s²).
-    let visible = |x: f64| cos * 0.5 * PI64_SQRT * (1.0 + libm::erf(x)) + sin * 0.5 * (-x * x).exp();
-    let upper = if sin > 1e-9 { (cos / sin).min(6.0) } else { 6.0 };
-    let target = f64::from(u.x) * visible(upper);
-    let (mut low, mut high) = (-6.0, upper);
-    let mut x = 0.0f64.clamp(low, high);
-    for _ in 0..24 {
-        let error = visible(x) - target;
-        if error > 0.0 {
-            high = x
-        } else {
-            low = x
-        }
-        let density = (cos - x * sin) * (-x * x).exp();
-        let newton = x - error / density;
-        let next = if density > 0.0 && newton > low && newton < high { newton } else { 0.5 * (low + high) };
-        let step = (next - x).abs();
-        x = next;
-        if step < 1e-7 {
-            break;
-        }
-    }
-    vec2(x as f32, across)
-}
-
-const PI64_SQRT: f64 = 1.772_453_850_905_516;
-
-/// Inverse error function (Giles 2012, single precision).
-fn erf_inv(x: f32) -> f32 {
-    let w = -((1.0 - x) * (1.0 + x)).max(1e-12).ln();
-    let polynomial = |coefficients: [f32; 9], w: f32| coefficients.into_iter().fold(0.0, |sum, c| sum * w + c);
-    const CENTRE: [f32; 9] = [
-        2.810_226_4e-8,
-        3.432_739_4e-7,
-        -3.523_387_7e-6,
-        -4.391_506_5e-6,
-        2.185_808_7e-4,
-        -1.253_725_e-3,
-        -4.177_681_6e-3,
-        0.246_640_73,
-        1.501_409_4,
-    ];
-    const TAIL: [f32; 9] = [
-        -2.002_142_6e-4,
-        1.009_505_6e-4,
-        1.349_343_2e-3,
-        -3.673_428_4e-3,
-        5.739_507_7e-3,
-        -7.622_461_3e-3,
-        9.438_870_5e-3,
-        1.001_674,
-        2.832_976_8,
-    ];
-    if w < 5.0 { polynomial(CENTRE, w - 2.5) * x } else { polynomial(TAIL, w.sqrt() - 3.0) * x }
-}
-
-/// Directional integrals of a rough dielectric interface, tabulated over the cosine.
+/// Directional integrals of a rough dielectric interface.
 pub struct RoughTransmittance {
-    table: [f32; Self::NODES],
+    series: Transmittance<1>,
     /// Diffuse reflectance of the interface from inside.
     pub internal: f32,
 }
 
-impl RoughTransmittance {
-    const NODES: usize = 64;
-    const QUADRATURE: usize = 32;
+/// Nodes of the quadrature along either random number: two packets.
+const QUADRATURE: usize = 2 * LANES;
 
-    /// Tabulates for relative index `eta` > 1. The transmittance counts light that is refracted and not masked
-    /// on its way out; the internal reflectance is the mean of 2 R(µ) µ over the nodes.
+/// Cosines of which the internal reflectance is the mean.
+const COSINES: usize = 64;
+
+impl RoughTransmittance {
+    /// Integrates for relative index `eta` > 1. The transmittance counts light that is refracted and not masked
+    /// on its way out; the internal reflectance is the mean of 2 R(µ) µ over equally spaced cosines.
     pub fn new(facets: Microfacet, eta: f32) -> Self {
-        use crate::math::fresnel;
-        let rule = gauss_legendre(Self::QUADRATURE);
-        let node = |k: usize| (k as f32 / (Self::NODES - 1) as f32).max(1e-6);
-        let transmitted = |wi: Vec3, m: Vec3| {
-            let found = fresnel::dielectric(wi.dot(m), eta);
-            let wo = fresnel::refract_about(wi, m, found.cos_t, found.eta_ti);
-            if wo.z < 0.0 { facets.g1(wo, m) * (1.0 - found.reflectance) } else { 0.0 }
+        let rule = gauss_legendre(QUADRATURE);
+        let [nodes, weights] = [0, 1].map(|k| rule.iter().map(|node| [node.0, node.1][k]).collect::<Vec<f32>>());
+        let facets = Facets { ggx: Mask([facets.facets().ggx.0[0]; LANES]), alpha: facets.alpha.to_array().map(Lanes::splat) };
+        let transmitted = |wi: Lanes3, m: Lanes3| {
+            let found = fresnel::dielectric(wi.dot(m), Lanes::splat(eta));
+            let wo = fresnel::refract_about(wi, m, &found);
+            wo.z.less(Lanes::ZERO).select(facets.g1(wo, m) * (Lanes::ONE - found.reflectance), Lanes::ZERO)
         };
-        let reflected = |wi: Vec3, m: Vec3| {
+        let reflected = |wi: Lanes3, m: Lanes3| {
             let wo = fresnel::reflect_about(wi, m);
-            if wo.z > 0.0 { facets.g1(wo, m) * fresnel::dielectric(wi.dot(m), 1.0 / eta).reflectance } else { 0.0 }
+            let share = fresnel::dielectric(wi.dot(m), Lanes::splat(1.0 / eta)).reflectance;
+            wo.z.greater(Lanes::ZERO).select(facets.g1(wo, m) * share, Lanes::ZERO)
         };
-        let average = |mu: f32, term: &dyn Fn(Vec3, Vec3) -> f32| {
-            let wi = vec3((1.0 - mu * mu).max(0.0).sqrt(), 0.0, mu);
-            let row = |&(v, weight): &(f32, f32)| {
-                let value = |&(u, weight): &(f32, f32)| weight * term(wi, facets.sample_visible(wi, vec2(u, v)));
-                weight * rule.iter().map(value).sum::<f32>()
+        let average = |mu: f32, term: &dyn Fn(Lanes3, Lanes3) -> Lanes| {
+            let mu = mu.max(1e-6);
+            let wi = Lanes3::splat(vec3((1.0 - mu * mu).max(0.0).sqrt(), 0.0, mu));
+            let packet = |first: usize, v: f32| {
+                let (u, weight): (Lanes, Lanes) = (Lanes::load(&nodes[first..]), Lanes::load(&weights[first..]));
+                (weight * term(wi, facets.sample_visible(wi, [u, Lanes::splat(v)]))).sum()
             };
-            rule.iter().map(row).sum::<f32>()
+            rule.iter().map(|&(v, weight)| weight * (packet(0, v) + packet(LANES, v))).sum::<f32>()
         };
-        let table = std::array::from_fn(|k| average(node(k), &transmitted));
-        let internal = (0..Self::NODES).map(|k| 2.0 * node(k) * average(node(k), &reflected)).sum::<f32>();
-        Self { table, internal: internal / Self::NODES as f32 }
+        let internal = (0..COSINES).map(|k| k as f32 / (COSINES - 1) as f32);
+        let internal = internal.map(|mu| 2.0 * mu * average(mu, &reflected)).sum::<f32>() / COSINES as f32;
+        Self { series: Transmittance::fit(|mu| average(mu, &transmitted)), internal }
     }
 
     /// Transmitted share at a cosine in [0, 1].
     pub fn at(&self, cos: f32) -> f32 {
-        let x = cos.clamp(0.0, 1.0) * (Self::NODES - 1) as f32;
-        let i = (x as usize).min(Self::NODES - 2);
-        let f = x - i as f32;
-        self.table[i] * (1.0 - f) + self.table[i + 1] * f
+        self.series.at(Lanes([cos])).0[0]
+    }
+
+    /// The transmittance as closures have it.
+    pub fn series(&self) -> Transmittance<1> {
+        self.series
     }
 }
 
@@ -339,13 +252,6 @@ mod tests {
                 assert!(sampled.distance(Vec3::from_array(expected)) < 1e-2, "{facets:?} {wi}: {sampled} {expected:?}");
             }
         });
-    }
-
-    #[test]
-    fn inverse_error_function_inverts() {
-        for x in [-0.999f32, -0.7, -1e-3, 0.0, 0.5, 0.99] {
-            assert!((libm::erff(erf_inv(x)) - x).abs() < 2e-6, "{x}");
-        }
     }
 
     #[test]

@@ -29,9 +29,10 @@ mod ward;
 use std::sync::Arc;
 
 use super::Surface;
+use super::closure::Closure;
 use super::load::Plugin;
 use super::load::props::{Object, Property, Value};
-use super::texture::Texture;
+use super::texture::{Point, Texture};
 use crate::error::Result;
 use crate::math::{Rgb, Vec2, Vec3, vec3};
 
@@ -139,30 +140,42 @@ pub struct Delta {
     pub probability: f32,
 }
 
-/// A material that is diffuse and nothing else.
-pub struct Lambert {
-    /// Its reflectance.
-    pub reflectance: Arc<dyn Texture>,
-    /// Whether it looks the same from behind.
-    pub two_sided: bool,
-}
+/// A surface that is put together only where a material asks for more than its texture coordinates.
+pub type Whole<'a> = &'a dyn Fn() -> Surface;
 
-/// Scattering at a surface.
+/// Scattering at a surface. A material says either what its closure is or, if it has none, how it scatters.
 pub trait Bsdf: Send + Sync {
+    /// The material at a surface, if it is one of the [kinds](crate::scene::closure::Kind) that packets evaluate. It has one
+    /// everywhere or nowhere.
+    fn closure(&self, _at: &Point, _surface: Whole) -> Option<Closure> {
+        None
+    }
+
+    /// Everything that the closure looks up.
+    fn textures(&self) -> Vec<&dyn Texture> {
+        Vec::new()
+    }
+
     /// Draws a direction from the lobe number `lobe` in [0, 1) and `u`. `None` absorbs.
-    fn sample(&self, surface: &Surface, wi: Vec3, lobe: f32, u: Vec2) -> Option<BsdfSample>;
+    fn sample(&self, surface: &Surface, wi: Vec3, lobe: f32, u: Vec2) -> Option<BsdfSample> {
+        self.closure(&surface.at, &|| *surface)?.sample_one(wi, lobe, u)
+    }
 
     /// The smooth lobes.
-    fn eval(&self, surface: &Surface, wi: Vec3, wo: Vec3) -> Eval;
+    fn eval(&self, surface: &Surface, wi: Vec3, wo: Vec3) -> Eval {
+        self.closure(&surface.at, &|| *surface).map_or_else(Eval::default, |closure| closure.eval_one(wi, wo))
+    }
 
     /// Scattering by a delta lobe; `None` if the material has none, or if it does not scatter `wi`.
-    fn delta(&self, _surface: &Surface, _wi: Vec3, _lobe: Lobe) -> Option<Delta> {
-        None
+    fn delta(&self, surface: &Surface, wi: Vec3, lobe: Lobe) -> Option<Delta> {
+        self.closure(&surface.at, &|| *surface)?.delta(wi, lobe)
     }
 
     /// Smallest roughness (Beckmann or GGX alpha) of the smooth lobes, infinite for diffuse ones; `None` without
     /// smooth lobes.
-    fn roughness(&self, surface: &Surface) -> Option<f32>;
+    fn roughness(&self, surface: &Surface) -> Option<f32> {
+        self.closure(&surface.at, &|| *surface)?.roughness_of_one()
+    }
 
     /// Overall colour in [0, 1], the same from everywhere: the albedo feature.
     fn albedo(&self, surface: &Surface) -> Rgb;
@@ -174,11 +187,6 @@ pub trait Bsdf: Send + Sync {
 
     /// Interior over exterior index of refraction of the smooth lobes that refract, if there are such.
     fn refraction(&self) -> Option<f32> {
-        None
-    }
-
-    /// The material, if it is diffuse and nothing else.
-    fn lambert(&self) -> Option<Lambert> {
         None
     }
 

@@ -34,4 +34,8 @@ impl NormalMap for Normals {
     fn normal(&self, surface: &Surface) -> Vec3 {
         (2.0 * self.0.color(&surface.at) - Rgb::ONE).normalize_or(Vec3::Z)
     }
+
+    fn texture(&self) -> &dyn Texture {
+        &*self.0
+    }
 }

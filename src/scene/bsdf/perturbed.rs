@@ -2,17 +2,22 @@
 
 use std::sync::Arc;
 
-use super::{Bsdf, BsdfSample, Delta, Eval, Lobe};
+use super::{Bsdf, BsdfSample, Delta, Eval, Lobe, Whole};
 use crate::error::Result;
-use crate::math::{Frame, Rgb, Vec2, Vec3, vec3};
+use crate::math::{Rgb, Vec2, Vec3};
 use crate::scene::Surface;
+use crate::scene::closure::{Closure, Perturbation};
 use crate::scene::load::Loader;
 use crate::scene::load::props::Object;
+use crate::scene::texture::{Point, Texture};
 
 /// Source of the perturbed normal.
 pub trait NormalMap: Send + Sync {
     /// The perturbed normal in the shading frame, of length one.
     fn normal(&self, surface: &Surface) -> Vec3;
+
+    /// The texture that it is read from.
+    fn texture(&self) -> &dyn Texture;
 }
 
 /// The nested material under perturbed normals.
@@ -23,12 +28,6 @@ pub struct Perturbed<B> {
     /// Attenuate directions that the bumps would shadow, where the perturbed normal would otherwise cut light off.
     shadowing: bool,
     nested: Arc<dyn Bsdf>,
-}
-
-/// The perturbed frame, in coordinates of the unperturbed one.
-struct BentFrame {
-    frame: Frame,
-    shadow_alpha2: f32,
 }
 
 impl<B: NormalMap> Perturbed<B> {
@@ -42,55 +41,47 @@ impl<B: NormalMap> Perturbed<B> {
         })
     }
 
-    fn frame(&self, surface: &Surface, wi: Vec3) -> BentFrame {
-        let mut n = self.map.normal(surface);
-        if self.flip_invalid && wi.z * wi.dot(n) <= 0.0 {
-            n = vec3(-n.x, -n.y, n.z);
-        }
-        let tan2 = (n.x * n.x + n.y * n.y) / (n.z * n.z).max(1e-12);
-        BentFrame {
-            frame: Frame::along(n, Vec3::X),
-            shadow_alpha2: if self.shadowing { (0.125 * tan2).min(1.0) } else { 0.0 },
-        }
-    }
-}
-
-impl BentFrame {
-    /// Both directions in the perturbed frame; `None` when the outgoing one changes sides.
-    fn map(&self, wi: Vec3, wo: Vec3) -> Option<(Vec3, Vec3)> {
-        let perturbed_wo = self.frame.to_local(wo);
-        (wo.z * perturbed_wo.z > 0.0).then(|| (self.frame.to_local(wi), perturbed_wo))
-    }
-
-    fn shadow(&self, wo: Vec3) -> f32 {
-        let tan2 = (wo.x * wo.x + wo.y * wo.y) / (wo.z * wo.z).max(1e-12);
-        2.0 / (1.0 + (1.0 + self.shadow_alpha2 * tan2).sqrt())
+    fn perturbation(&self, surface: &Surface) -> Perturbation<1> {
+        Perturbation::new(self.map.normal(surface), self.flip_invalid, self.shadowing)
     }
 }
 
 impl<B: NormalMap> Bsdf for Perturbed<B> {
+    fn closure(&self, at: &Point, surface: Whole) -> Option<Closure> {
+        self.nested.closure(at, surface)?.under(self.perturbation(&surface()))
+    }
+
+    fn textures(&self) -> Vec<&dyn Texture> {
+        self.nested.textures().into_iter().chain([self.map.texture()]).collect()
+    }
+
     fn sample(&self, surface: &Surface, wi: Vec3, lobe: f32, u: Vec2) -> Option<BsdfSample> {
-        let perturbed = self.frame(surface, wi);
-        let sample = self.nested.sample(surface, perturbed.frame.to_local(wi), lobe, u)?;
-        let wo = perturbed.frame.to_world(sample.wo);
-        if wo.z * sample.wo.z <= 0.0 {
-            return None;
-        }
-        Some(BsdfSample { wo, weight: sample.weight * perturbed.shadow(wo), ..sample })
+        let perturbation = self.perturbation(surface);
+        let frame = perturbation.frame_of(wi);
+        let sample = self.nested.sample(surface, frame.to_local(wi), lobe, u)?;
+        let wo = frame.to_world(sample.wo);
+        let weight = sample.weight * perturbation.unshadowed_of(wo);
+        (wo.z * sample.wo.z > 0.0).then_some(BsdfSample { wo, weight, ..sample })
     }
 
     fn eval(&self, surface: &Surface, wi: Vec3, wo: Vec3) -> Eval {
-        let perturbed = self.frame(surface, wi);
-        let Some((perturbed_wi, perturbed_wo)) = perturbed.map(wi, wo) else { return Eval::default() };
-        let Eval { value, pdf } = self.nested.eval(surface, perturbed_wi, perturbed_wo);
-        Eval { value: value * perturbed.shadow(wo), pdf }
+        let perturbation = self.perturbation(surface);
+        let frame = perturbation.frame_of(wi);
+        let perturbed_wo = frame.to_local(wo);
+        if wo.z * perturbed_wo.z <= 0.0 {
+            return Eval::default();
+        }
+        let Eval { value, pdf } = self.nested.eval(surface, frame.to_local(wi), perturbed_wo);
+        Eval { value: value * perturbation.unshadowed_of(wo), pdf }
     }
 
     fn delta(&self, surface: &Surface, wi: Vec3, lobe: Lobe) -> Option<Delta> {
-        let perturbed = self.frame(surface, wi);
-        let delta = self.nested.delta(surface, perturbed.frame.to_local(wi), lobe)?;
-        let wo = perturbed.frame.to_world(delta.wo);
-        (wo.z * delta.wo.z > 0.0).then(|| Delta { wo, value: delta.value * perturbed.shadow(wo), ..delta })
+        let perturbation = self.perturbation(surface);
+        let frame = perturbation.frame_of(wi);
+        let delta = self.nested.delta(surface, frame.to_local(wi), lobe)?;
+        let wo = frame.to_world(delta.wo);
+        let value = delta.value * perturbation.unshadowed_of(wo);
+        (wo.z * delta.wo.z > 0.0).then_some(Delta { wo, value, ..delta })
     }
 
     fn roughness(&self, surface: &Surface) -> Option<f32> {

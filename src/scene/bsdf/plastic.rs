@@ -1,15 +1,16 @@
 //! Smooth plastic: a dielectric coat over a diffuse base, with the light that is reflected back inside.
 
-use std::f32::consts::FRAC_1_PI;
 use std::sync::Arc;
 
-use super::{Bsdf, BsdfSample, Delta, Eval, Lobe, POLYPROPYLENE, relative_ior, specular_share};
+use super::{Bsdf, POLYPROPYLENE, Whole, relative_ior, specular_share};
 use crate::error::Result;
-use crate::math::{Rgb, Vec2, Vec3, fresnel, warp};
+use crate::math::lanes::{Lanes, Lanes3};
+use crate::math::{Rgb, fresnel};
 use crate::scene::Surface;
+use crate::scene::closure::{self, Closure};
 use crate::scene::load::props::Object;
 use crate::scene::load::{Loader, Plugin};
-use crate::scene::texture::Texture;
+use crate::scene::texture::{Point, Texture};
 
 /// `plastic`.
 pub const PLUGIN: Plugin<Arc<dyn Bsdf>> = Plugin {
@@ -48,22 +49,25 @@ impl Base {
     }
 
     /// Colour of the coat's reflection.
-    pub fn specular(&self, surface: &Surface) -> Rgb {
-        self.specular.color(&surface.at)
+    pub fn specular(&self, at: &Point) -> Rgb {
+        self.specular.color(at)
     }
 
-    /// f |cos θo| of the base, for transmitted shares `t` of the coat in both directions together.
-    pub fn value(&self, surface: &Surface, cos_o: f32, t: f32) -> Rgb {
-        let color = self.diffuse.color(&surface.at);
+    /// Colour of the base with the light that the coat sends back to it, without the coat's transmittances.
+    pub fn base(&self, at: &Point) -> Rgb {
+        let color = self.diffuse.color(at);
         let returned = if self.nonlinear { color * self.internal } else { Rgb::splat(self.internal) };
-        color / (Rgb::ONE - returned) * (FRAC_1_PI * cos_o * self.inverse_eta_squared * t)
+        color / (Rgb::ONE - returned) * self.inverse_eta_squared
     }
 
-    /// Probability of sampling the coat where it reflects the share `reflectance`.
-    pub fn coat_probability(&self, reflectance: f32) -> f32 {
-        let coat = reflectance * self.specular_share;
-        let base = (1.0 - reflectance) * (1.0 - self.specular_share);
-        if coat + base > 0.0 { coat / (coat + base) } else { 1.0 }
+    /// Share of the coat in sampling where both are equally bright.
+    pub fn specular_share(&self) -> f32 {
+        self.specular_share
+    }
+
+    /// Both reflectances.
+    pub fn textures(&self) -> Vec<&dyn Texture> {
+        vec![&*self.diffuse, &*self.specular]
     }
 
     /// The base's colour with the coat's white, as a feature.
@@ -77,47 +81,15 @@ struct Plastic {
     base: Base,
 }
 
-impl Plastic {
-    fn reflectance(&self, cos: f32) -> f32 {
-        fresnel::dielectric(cos, self.eta).reflectance
-    }
-}
-
 impl Bsdf for Plastic {
-    fn sample(&self, surface: &Surface, wi: Vec3, lobe: f32, u: Vec2) -> Option<BsdfSample> {
-        if wi.z <= 0.0 {
-            return None;
-        }
-        if lobe < self.base.coat_probability(self.reflectance(wi.z)) {
-            let Delta { wo, value, probability } = self.delta(surface, wi, Lobe::DeltaReflect)?;
-            let weight = value / probability;
-            return Some(BsdfSample { wo, weight, pdf: probability, lobe: Lobe::DeltaReflect, eta: 1.0 });
-        }
-        let wo = warp::cosine_hemisphere(u);
-        self.eval(surface, wi, wo).sampled(wo)
+    fn closure(&self, at: &Point, _surface: Whole) -> Option<Closure> {
+        let [base, specular] = [self.base.base(at), self.base.specular(at)].map(Lanes3::splat);
+        let [eta, share] = [self.eta, self.base.specular_share()].map(|value| Lanes([value]));
+        Some(closure::Plastic { eta, base, specular, share }.closure(Some(f32::INFINITY)))
     }
 
-    fn eval(&self, surface: &Surface, wi: Vec3, wo: Vec3) -> Eval {
-        if wi.z <= 0.0 || wo.z <= 0.0 {
-            return Eval::default();
-        }
-        let (ri, ro) = (self.reflectance(wi.z), self.reflectance(wo.z));
-        let value = self.base.value(surface, wo.z, (1.0 - ri) * (1.0 - ro));
-        Eval { value, pdf: (1.0 - self.base.coat_probability(ri)) * warp::cosine_hemisphere_pdf(wo.z) }
-    }
-
-    fn delta(&self, surface: &Surface, wi: Vec3, lobe: Lobe) -> Option<Delta> {
-        if wi.z <= 0.0 || lobe != Lobe::DeltaReflect {
-            return None;
-        }
-        let reflectance = self.reflectance(wi.z);
-        let value = self.base.specular(surface) * reflectance;
-        let probability = self.base.coat_probability(reflectance);
-        (probability > 0.0).then_some(Delta { wo: fresnel::reflect(wi), value, probability })
-    }
-
-    fn roughness(&self, _surface: &Surface) -> Option<f32> {
-        Some(f32::INFINITY)
+    fn textures(&self) -> Vec<&dyn Texture> {
+        self.base.textures()
     }
 
     fn albedo(&self, surface: &Surface) -> Rgb {

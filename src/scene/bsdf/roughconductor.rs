@@ -2,14 +2,16 @@
 
 use std::sync::Arc;
 
+use super::{Bsdf, Whole};
 use super::conductor::Metal;
 use super::microfacet::Roughness;
-use super::{Bsdf, BsdfSample, Eval, Lobe};
 use crate::error::Result;
-use crate::math::{Rgb, Vec2, Vec3, fresnel};
+use crate::math::Rgb;
 use crate::scene::Surface;
+use crate::scene::closure::{self, Closure};
 use crate::scene::load::props::Object;
 use crate::scene::load::{Loader, Plugin};
+use crate::scene::texture::{Point, Texture};
 
 /// `roughconductor`.
 pub const PLUGIN: Plugin<Arc<dyn Bsdf>> = Plugin {
@@ -29,37 +31,19 @@ struct RoughConductor {
 }
 
 impl Bsdf for RoughConductor {
-    fn sample(&self, surface: &Surface, wi: Vec3, _lobe: f32, u: Vec2) -> Option<BsdfSample> {
-        if wi.z <= 0.0 {
-            return None;
-        }
-        let facets = self.roughness.at(surface);
-        let m = facets.sample_visible(wi, u);
-        let wo = fresnel::reflect_about(wi, m);
-        let pdf = facets.reflect_pdf(wi, m);
-        if wo.z <= 0.0 || pdf <= 0.0 {
-            return None;
-        }
-        let weight = self.metal.reflectance(surface, wi.dot(m)) * facets.g1(wo, m);
-        Some(BsdfSample { wo, weight, pdf, lobe: Lobe::Smooth, eta: 1.0 })
+    fn closure(&self, at: &Point, _surface: Whole) -> Option<Closure> {
+        let [eta, k, tint] = self.metal.at(at);
+        let facets = self.roughness.at(at);
+        let roughness = Some(facets.smallest());
+        Some(closure::RoughConductor { eta, k, tint, facets: facets.facets() }.closure(roughness))
     }
 
-    fn eval(&self, surface: &Surface, wi: Vec3, wo: Vec3) -> Eval {
-        if wi.z <= 0.0 || wo.z <= 0.0 {
-            return Eval::default();
-        }
-        let facets = self.roughness.at(surface);
-        let m = (wi + wo).normalize();
-        let pdf = facets.reflect_pdf(wi, m);
-        Eval { value: self.metal.reflectance(surface, wi.dot(m)) * (pdf * facets.g1(wo, m)), pdf }
-    }
-
-    fn roughness(&self, surface: &Surface) -> Option<f32> {
-        Some(self.roughness.at(surface).smallest())
+    fn textures(&self) -> Vec<&dyn Texture> {
+        self.roughness.textures().chain([self.metal.texture()]).collect()
     }
 
     fn albedo(&self, surface: &Surface) -> Rgb {
-        self.metal.reflectance(surface, 1.0).clamp(Rgb::ZERO, Rgb::ONE)
+        self.metal.albedo(surface)
     }
 
     fn needs_derivatives(&self) -> bool {

@@ -4,12 +4,15 @@ use std::sync::Arc;
 
 use super::microfacet::{Kind, Microfacet, RoughTransmittance};
 use super::plastic::Base;
-use super::{Bsdf, BsdfSample, Eval, POLYPROPYLENE, relative_ior};
+use super::{Bsdf, POLYPROPYLENE, Whole, relative_ior};
 use crate::error::Result;
-use crate::math::{Rgb, Vec2, Vec3, fresnel, warp};
+use crate::math::Rgb;
+use crate::math::lanes::{Lanes, Lanes3};
 use crate::scene::Surface;
+use crate::scene::closure::{self, Closure};
 use crate::scene::load::props::Object;
 use crate::scene::load::{Loader, Plugin};
+use crate::scene::texture::{Point, Texture};
 
 /// `roughplastic`.
 pub const PLUGIN: Plugin<Arc<dyn Bsdf>> = Plugin {
@@ -40,36 +43,16 @@ struct RoughPlastic {
 }
 
 impl Bsdf for RoughPlastic {
-    fn sample(&self, surface: &Surface, wi: Vec3, lobe: f32, u: Vec2) -> Option<BsdfSample> {
-        if wi.z <= 0.0 {
-            return None;
-        }
-        let coat = self.base.coat_probability(1.0 - self.transmittance.at(wi.z));
-        let wo = if lobe < coat {
-            fresnel::reflect_about(wi, self.facets.sample_visible(wi, u))
-        } else {
-            warp::cosine_hemisphere(u)
-        };
-        self.eval(surface, wi, wo).sampled(wo)
+    fn closure(&self, at: &Point, _surface: Whole) -> Option<Closure> {
+        let [base, specular] = [self.base.base(at), self.base.specular(at)].map(Lanes3::splat);
+        let [eta, share] = [self.eta, self.base.specular_share()].map(|value| Lanes([value]));
+        let (facets, transmittance) = (self.facets.facets(), self.transmittance.series());
+        let lobes = closure::RoughPlastic { eta, base, specular, share, facets, transmittance };
+        Some(lobes.closure(Some(self.facets.smallest())))
     }
 
-    fn eval(&self, surface: &Surface, wi: Vec3, wo: Vec3) -> Eval {
-        if wi.z <= 0.0 || wo.z <= 0.0 {
-            return Eval::default();
-        }
-        let m = (wi + wo).normalize();
-        let reflected = self.facets.reflect_pdf(wi, m);
-        let reflectance = fresnel::dielectric(wi.dot(m), self.eta).reflectance;
-        let specular = self.base.specular(surface) * (reflectance * reflected * self.facets.g1(wo, m));
-        let ti = self.transmittance.at(wi.z);
-        let diffuse = self.base.value(surface, wo.z, ti * self.transmittance.at(wo.z));
-        let coat = self.base.coat_probability(1.0 - ti);
-        let pdf = coat * reflected + (1.0 - coat) * warp::cosine_hemisphere_pdf(wo.z);
-        Eval { value: specular + diffuse, pdf }
-    }
-
-    fn roughness(&self, _surface: &Surface) -> Option<f32> {
-        Some(self.facets.smallest())
+    fn textures(&self) -> Vec<&dyn Texture> {
+        self.base.textures()
     }
 
     fn albedo(&self, surface: &Surface) -> Rgb {

@@ -2,12 +2,14 @@
 
 use std::sync::Arc;
 
-use super::{Bsdf, BsdfSample, Delta, Eval, Lambert, Lobe, mirror};
+use super::{Bsdf, BsdfSample, Delta, Eval, Lobe, Whole, mirror};
 use crate::error::Result;
 use crate::math::{Rgb, Vec2, Vec3};
 use crate::scene::Surface;
+use crate::scene::closure::Closure;
 use crate::scene::load::props::Object;
 use crate::scene::load::{Loader, Plugin};
+use crate::scene::texture::{Point, Texture};
 
 /// `twosided`.
 pub const PLUGIN: Plugin<Arc<dyn Bsdf>> =
@@ -37,6 +39,15 @@ impl TwoSided {
 }
 
 impl Bsdf for TwoSided {
+    fn closure(&self, at: &Point, surface: Whole) -> Option<Closure> {
+        let same = Arc::ptr_eq(&self.front, &self.back);
+        self.front.closure(at, surface).filter(|_| same)?.on_both_sides()
+    }
+
+    fn textures(&self) -> Vec<&dyn Texture> {
+        self.front.textures()
+    }
+
     fn sample(&self, surface: &Surface, wi: Vec3, lobe: f32, u: Vec2) -> Option<BsdfSample> {
         if wi.z >= 0.0 {
             return self.front.sample(surface, wi, lobe, u);
@@ -66,11 +77,6 @@ impl Bsdf for TwoSided {
 
     fn albedo(&self, surface: &Surface) -> Rgb {
         self.side(surface.wi).albedo(surface)
-    }
-
-    fn lambert(&self) -> Option<Lambert> {
-        let same = Arc::ptr_eq(&self.front, &self.back);
-        self.front.lambert().filter(|_| same).map(|lambert| Lambert { two_sided: true, ..lambert })
     }
 
     fn needs_derivatives(&self) -> bool {

@@ -1,27 +1,25 @@
 //! Properties of shapes and emitters that packets evaluate without virtual calls; found once, when a scene is built.
 
-use std::sync::Arc;
-
 use crate::math::alias::Alias;
 use crate::math::{Rgb, Vec3};
-use crate::scene::Shape;
+use crate::scene::closure::{Closure, Kind};
 use crate::scene::emitter::Emitter;
 use crate::scene::shape::mesh::Corners;
 use crate::scene::shape::{Geometry, Mesh};
-use crate::scene::texture::Texture;
+use crate::scene::{Shape, Surface};
 
 /// Properties of a shape.
 pub struct ShapeInfo {
     /// Index of its emitter, if it is emissive.
     pub emitter: Option<u32>,
-    /// Whether the material is a diffuse lobe and nothing else.
-    pub lambert: bool,
-    /// Whether the diffuse lobe is on both sides.
-    pub two_sided: bool,
-    /// Reflectance of a diffuse material without a texture.
-    pub color: Rgb,
-    /// Reflectance of a diffuse material with a texture.
-    pub texture: Option<Arc<dyn Texture>>,
+    /// Whether the material has a closure.
+    pub closes: bool,
+    /// Kind of the closure.
+    pub kind: Kind,
+    /// Whether that is a diffuse lobe and nothing else.
+    pub diffuse: bool,
+    /// The closure, if it is the same everywhere.
+    pub closure: Option<Closure>,
     /// Whether its hits are completed in lanes: meshes whose material needs no derivatives.
     pub mesh: bool,
     /// Whether texture coordinates are used.
@@ -31,21 +29,16 @@ pub struct ShapeInfo {
 impl ShapeInfo {
     /// The properties of a shape.
     pub fn new(shape: &Shape) -> Self {
-        let mesh = matches!(&*shape.geometry, Geometry::Mesh(_)) && !shape.bsdf.needs_derivatives();
-        let emitter = shape.emitter;
-        let Some(lambert) = shape.bsdf.lambert() else {
-            return Self { emitter, lambert: false, two_sided: false, color: Rgb::ZERO, texture: None, mesh, uv: true };
-        };
-        let color = lambert.reflectance.constant();
-        Self {
-            emitter,
-            lambert: true,
-            two_sided: lambert.two_sided,
-            color: color.unwrap_or_default(),
-            texture: color.is_none().then_some(lambert.reflectance),
-            mesh,
-            uv: color.is_none() || emitter.is_some(),
-        }
+        let Shape { geometry, bsdf, emitter } = shape;
+        let mesh = matches!(&**geometry, Geometry::Mesh(_)) && !bsdf.needs_derivatives();
+        let surface = Surface::default();
+        let closure = bsdf.closure(&surface.at, &|| surface);
+        let constant = bsdf.textures().iter().all(|texture| texture.constant().is_some());
+        let closes = closure.is_some();
+        let kind = closure.map_or(Kind::None, |closure| closure.kind());
+        let diffuse = closure.is_some_and(|closure| closure.plainly_diffuse().any());
+        let closure = closure.filter(|_| constant);
+        Self { emitter: *emitter, closes, kind, diffuse, mesh, uv: closure.is_none() || emitter.is_some(), closure }
     }
 }
 

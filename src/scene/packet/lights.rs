@@ -9,6 +9,7 @@ use crate::scene::{Scene, accel};
 
 /// Emitter points, as [`LightPoint`] has them.
 #[derive(Clone, Debug)]
+#[repr(align(64))]
 pub struct Lights {
     /// Positions; directions towards those at infinity.
     at: Lanes3,

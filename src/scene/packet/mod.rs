@@ -1,6 +1,6 @@
 //! Sixteen rays at a time: the surfaces that they hit, the light that these receive and how they scatter it.
 //!
-//! Triangle meshes, diffuse materials and meshes of uniform radiance, which make up most of nearly every scene, are
+//! Triangle meshes, materials with closures and meshes of uniform radiance, which make up most of nearly every scene, are
 //! evaluated in lanes; everything else goes through the scalar traits, lane by lane. Both give the same bits.
 
 mod info;
@@ -11,6 +11,6 @@ mod surfaces;
 
 pub(super) use self::info::{EmitterInfo, ShapeInfo};
 pub use self::lights::Lights;
-pub use self::materials::{Evals, Materials, Scatters, disk};
+pub use self::materials::Materials;
 pub use self::rays::Rays;
 pub use self::surfaces::{Frames, Surfaces};

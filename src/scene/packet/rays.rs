@@ -6,6 +6,7 @@ use crate::scene::Ray;
 
 /// Rays, coordinate by coordinate.
 #[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
 pub struct Rays {
     /// Origins.
     pub origin: Lanes3,

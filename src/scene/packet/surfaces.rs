@@ -6,23 +6,25 @@ use crate::math::lanes::{Bits, LANES, Lanes, Lanes3, Mask};
 use crate::math::{Frame, Vec3, vec2};
 use crate::scene::emitter::LightPoint;
 use crate::scene::shape::Geometry;
+use crate::scene::closure::KINDS;
 use crate::scene::{Scene, Shape, Surface, accel, surface, texture};
 
 /// Sixteen orthonormal frames.
 #[derive(Clone, Copy, Debug)]
-pub struct Frames {
+#[repr(align(64))]
+pub struct Frames<const N: usize = LANES> {
     /// First tangents.
-    pub s: Lanes3,
+    pub s: Lanes3<N>,
     /// Second tangents.
-    pub t: Lanes3,
+    pub t: Lanes3<N>,
     /// Normals.
-    pub n: Lanes3,
+    pub n: Lanes3<N>,
 }
 
-impl Frames {
+impl<const N: usize> Frames<N> {
     /// [`Frame::around`].
     #[inline(always)]
-    pub fn around(n: Lanes3) -> Self {
+    pub fn around(n: Lanes3<N>) -> Self {
         let one = Lanes::splat(1.0);
         let sign = one.copysign(n.z);
         let a = -one / (sign + n.z);
@@ -32,21 +34,38 @@ impl Frames {
         Self { s, t, n }
     }
 
+    /// [`Frame::along`].
+    #[inline(always)]
+    pub fn along(n: Lanes3<N>, tangent: Lanes3<N>) -> Self {
+        let across = tangent - n * n.dot(tangent);
+        let possible = across.dot(across).greater(Lanes::splat(1e-8) * tangent.dot(tangent));
+        let s = across.normalize_or(Lanes3::ZERO);
+        let (along, around) = (Self { s, t: n.cross(s), n }, Self::around(n));
+        Self { s: possible.select3(along.s, around.s), t: possible.select3(along.t, around.t), n }
+    }
+
+    /// The frame of one lane.
+    #[inline(always)]
+    pub fn get(&self, lane: usize) -> Frame {
+        Frame { s: self.s.get(lane), t: self.t.get(lane), n: self.n.get(lane) }
+    }
+
     /// World to local.
     #[inline(always)]
-    pub fn to_local(&self, v: Lanes3) -> Lanes3 {
+    pub fn to_local(&self, v: Lanes3<N>) -> Lanes3<N> {
         Lanes3 { x: self.s.dot(v), y: self.t.dot(v), z: self.n.dot(v) }
     }
 
     /// Local to world.
     #[inline(always)]
-    pub fn to_world(&self, v: Lanes3) -> Lanes3 {
+    pub fn to_world(&self, v: Lanes3<N>) -> Lanes3<N> {
         self.s * v.x + self.t * v.y + self.n * v.z
     }
 }
 
 /// Surfaces, as [`Surface`] has them.
 #[derive(Clone, Debug)]
+#[repr(align(64))]
 pub struct Surfaces {
     /// Positions.
     pub p: Lanes3,
@@ -93,11 +112,10 @@ impl Surfaces {
     /// The surface of one lane.
     #[inline]
     pub fn get(&self, lane: usize) -> Surface {
-        let frame = Frame { s: self.frame.s.get(lane), t: self.frame.t.get(lane), n: self.frame.n.get(lane) };
         Surface {
             p: self.p.get(lane),
             n: self.n.get(lane),
-            frame,
+            frame: self.frame.get(lane),
             at: self.at(lane),
             dp_du: self.dp_du.get(lane),
             dp_dv: self.dp_dv.get(lane),
@@ -178,9 +196,29 @@ impl Scene {
     /// Intersects the active rays with the scene; returns the lanes that hit a surface. `coherent`: the rays are close to
     /// each other.
     pub fn intersect_packet(&self, rays: &Rays, active: Mask, coherent: bool, surfaces: &mut Surfaces) -> Mask {
-        let hits = self.accel.intersect_packet(rays, active, coherent);
+        let hits = self.hits_of_packet(rays, active, coherent);
+        self.surfaces_of_packet(rays, &hits, active, surfaces)
+    }
+
+    /// The hits of the active rays, not yet completed.
+    pub fn hits_of_packet(&self, rays: &Rays, active: Mask, coherent: bool) -> Hits {
+        self.accel.intersect_packet(rays, active, coherent)
+    }
+
+    /// Kind of the material that a ray has hit, to sort by; the largest number if it has hit nothing.
+    #[inline(always)]
+    pub fn kind_of_hit(&self, hits: &Hits, lane: usize) -> usize {
+        let geometry = hits.geometry[lane];
+        if geometry == u32::MAX {
+            return KINDS;
+        }
+        self.shape_infos[self.accel.shape_of(geometry, hits.instance[lane])].kind as usize
+    }
+
+    /// Completes the hits of the active rays; returns the lanes that have hit a surface.
+    pub fn surfaces_of_packet(&self, rays: &Rays, hits: &Hits, active: Mask, surfaces: &mut Surfaces) -> Mask {
         let found = !Bits(hits.geometry).equal(u32::MAX) & active;
-        let left = meshes((&self.shapes, &self.shape_infos), self.accel.size(), rays, &hits, found, surfaces);
+        let left = meshes((&self.shapes, &self.shape_infos), self.accel.size(), rays, hits, found, surfaces);
         for lane in left.lanes() {
             let Some(hit) = hits.get(lane) else { continue };
             let mut one = self.accel.surface(&self.shapes, &hit, rays.get(lane));

@@ -8,11 +8,11 @@ use std::rc::Rc;
 
 use crate::error::Result;
 use crate::math::lanes::{Lanes, Lanes3};
-use crate::math::{Mat4, Vec2, Vec3, Vec4, vec2};
+use crate::math::{Mat4, Vec2, Vec3, Vec4, vec2, warp};
 use crate::scene::Ray;
 use crate::scene::load::Loader;
 use crate::scene::load::props::Object;
-use crate::scene::packet::{self, Rays};
+use crate::scene::packet::Rays;
 
 /// Films with more pixels than this are taken for a mistake.
 const MAX_PIXELS: u64 = 1 << 28;
@@ -248,7 +248,7 @@ fn view(sensor: &Sensor, [x, y]: [Lanes; 2], [lens_u, lens_v]: [Lanes; 2]) -> Ra
     let (origin, direction) = match sensor.projection {
         Projection::Pinhole => (Lanes3::ZERO, Lanes3 { x, y, z: one }),
         Projection::Lens { radius, focus } => {
-            let (u, v) = packet::disk(lens_u, lens_v);
+            let [u, v] = warp::disk_lanes([lens_u, lens_v]);
             let origin = Lanes3 { x: u, y: v, z: Lanes::ZERO } * Lanes::splat(radius);
             (origin, Lanes3 { x, y, z: one } * Lanes::splat(focus) - origin)
         }

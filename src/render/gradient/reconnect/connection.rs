@@ -17,6 +17,7 @@ fn in_range(jacobian: Lanes) -> Mask {
 }
 
 /// Segments from the offsets' vertices to the base paths' next vertices.
+#[repr(align(64))]
 pub struct Connections {
     /// Lanes whose connection carries light and is unoccluded.
     pub possible: Mask,

@@ -8,7 +8,7 @@ use super::states::{Kind, LevelStates, Prefix, Prefixes, States};
 use crate::math::lanes::{LANES, Lanes, Mask};
 use crate::scene::Surface;
 use crate::scene::bsdf::Lobe;
-use crate::scene::packet::Evals;
+use crate::scene::closure::Evals;
 
 impl OffsetSegment<'_> {
     /// Sets the states of the offsets at the next vertices, in one direction.

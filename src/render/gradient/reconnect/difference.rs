@@ -5,6 +5,7 @@ use crate::math::lanes::{Lanes, Lanes3};
 
 /// Contributions of sixteen base paths: f(x) before division by `density`, the sum over the sampling strategies.
 #[derive(Clone, Copy)]
+#[repr(align(64))]
 pub struct Contributions {
     pub base: Lanes3,
     pub density: Lanes,
@@ -26,6 +27,7 @@ impl Contributions {
 
 /// Last segments of sixteen offsets: the light that they receive apart from their base paths.
 #[derive(Clone, Copy)]
+#[repr(align(64))]
 pub struct LastSegments {
     /// f cos at the offset's vertex times the radiance received, times dω' / dω; zero where nothing is received.
     pub contribution: Lanes3,

@@ -25,7 +25,7 @@ pub fn sampled_emitters(
     let mut ends = LastSegments::NONE;
     let unconnected = active & states.are(Kind::Unconnected);
     if unconnected.any() {
-        let both_diffuse = context.diffuse(materials.roughness) & context.diffuse(offset.materials.roughness);
+        let both_diffuse = context.diffuse(materials.roughness()) & context.diffuse(offset.materials.roughness());
         // Nothing but next-event estimation samples an emitter of a single point, whatever the materials.
         let connected = unconnected & (light.points.delta | both_diffuse);
         ends = LastSegments::to_lights(scene, surfaces.p, offset, &light.points, connected);

@@ -5,8 +5,9 @@ use super::offsets::{OffsetSurfaces, SurfacePacket};
 use super::states::{Kind, States};
 use crate::math::lanes::{LANES, Lanes, Mask};
 use crate::render::vertices::Vertices;
-use crate::scene::bsdf::BsdfSample;
-use crate::scene::packet::{Evals, Surfaces};
+use crate::scene::bsdf::{BsdfSample, Lobe};
+use crate::scene::closure::Evals;
+use crate::scene::packet::Surfaces;
 use crate::scene::{Scene, Surface};
 
 /// One depth of a wave's base paths.
@@ -83,8 +84,8 @@ impl NextVertices {
             next.exists.set(lane, true);
             if unconnected.get(lane) {
                 next.surfaces.copy(lane, &there.surfaces, at);
-                let diffuse = there.materials.roughness.0[at] > context.threshold;
-                let smooth = there.scatters.smooth().get(at);
+                let diffuse = there.materials.roughness().0[at] > context.threshold;
+                let smooth = there.scatters.are(Lobe::Smooth).get(at);
                 next.connects_light.set(lane, diffuse);
                 next.lit.set(lane, there.lit.get(at));
                 next.scattered.set(lane, there.scattered.get(at));
@@ -150,8 +151,8 @@ impl<'a> OffsetSegment<'a> {
     ) -> Self {
         let Scratch { offset, extensions } = scratch;
         let unconnected = leaving & states.are(Kind::Unconnected);
-        let diffuse = context.diffuse(vertices.materials.roughness) & context.diffuse(offset.materials.roughness);
-        let connectable = unconnected & diffuse & vertices.scatters.smooth();
+        let diffuse = context.diffuse(vertices.materials.roughness()) & context.diffuse(offset.materials.roughness());
+        let connectable = unconnected & diffuse & vertices.scatters.are(Lobe::Smooth);
         extensions.clear();
         for lane in (unconnected & !connectable).lanes() {
             let (base, offset) = (vertices.surfaces.get(lane), offset.surfaces.get(lane));

@@ -14,6 +14,7 @@ pub struct Prefix {
 
 /// Sixteen prefixes.
 #[derive(Clone, Copy)]
+#[repr(align(64))]
 pub struct Prefixes {
     /// J f(y) / p(x).
     pub throughput: Lanes3,
@@ -62,6 +63,7 @@ pub enum Kind {
 
 /// Sixteen states.
 #[derive(Clone)]
+#[repr(align(64))]
 pub struct States {
     kind: Bits,
     /// Prefixes of the offsets.

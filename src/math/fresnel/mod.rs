@@ -1,6 +1,10 @@
 //! Fresnel equations and the directions they speak of. Local coordinates: the normal is +z, directions point
 //! away from the surface.
 
+pub mod lanes;
+
+use self::lanes::Dielectrics;
+use super::lanes::{Lanes, Lanes3};
 use super::{Rgb, Vec3, vec3};
 
 /// Reflection and refraction of a direction at a smooth dielectric interface.
@@ -17,39 +21,14 @@ pub struct Dielectric {
 /// Fresnel reflectance of a dielectric with relative index `eta` = interior / exterior, seen along a direction
 /// of cosine `cos_i` (negative: from inside).
 pub fn dielectric(cos_i: f32, eta: f32) -> Dielectric {
-    let eta_it = if cos_i >= 0.0 { eta } else { 1.0 / eta };
-    let eta_ti = 1.0 / eta_it;
-    let cos_t_squared = 1.0 - (1.0 - cos_i * cos_i) * eta_ti * eta_ti;
-    if eta == 1.0 {
-        return Dielectric { reflectance: 0.0, cos_t: -cos_i, eta_ti };
-    }
-    if cos_t_squared <= 0.0 {
-        return Dielectric { reflectance: 1.0, cos_t: 0.0, eta_ti };
-    }
-    let (ci, ct) = (cos_i.abs(), cos_t_squared.sqrt());
-    let s = (ci - eta_it * ct) / (ci + eta_it * ct);
-    let p = (ct - eta_it * ci) / (ct + eta_it * ci);
-    Dielectric { reflectance: 0.5 * (s * s + p * p), cos_t: -ct.copysign(cos_i), eta_ti }
+    let Dielectrics { reflectance, cos_t, eta_ti } = lanes::dielectric(Lanes([cos_i]), Lanes([eta]));
+    Dielectric { reflectance: reflectance.0[0], cos_t: cos_t.0[0], eta_ti: eta_ti.0[0] }
 }
 
 /// Fresnel reflectance of a conductor with complex index `eta - i k`, per channel (PBR Book, "Fresnel for
 /// conductors").
 pub fn conductor(cos_i: f32, eta: Rgb, k: Rgb) -> Rgb {
-    let cos2 = cos_i * cos_i;
-    let sin2 = 1.0 - cos2;
-    let channel = |eta: f32, k: f32| {
-        let t0 = eta * eta - k * k - sin2;
-        let a2_plus_b2 = (t0 * t0 + 4.0 * eta * eta * k * k).max(0.0).sqrt();
-        let a = (0.5 * (a2_plus_b2 + t0)).max(0.0).sqrt();
-        let (t1, t2) = (a2_plus_b2 + cos2, 2.0 * a * cos_i);
-        let s = (t1 - t2) / (t1 + t2);
-        let (t3, t4) = (a2_plus_b2 * cos2 + sin2 * sin2, t2 * sin2);
-        let p = s * (t3 - t4) / (t3 + t4);
-        let value = 0.5 * (s + p);
-        // Only 0/0 (a perfect index match at grazing incidence) gets here.
-        if value.is_finite() { value } else { 1.0 }
-    };
-    vec3(channel(eta.x, k.x), channel(eta.y, k.y), channel(eta.z, k.z))
+    lanes::conductor::<1>(Lanes([cos_i]), Lanes3::splat(eta), Lanes3::splat(k)).get(0)
 }
 
 /// Average reflectance of a dielectric interface under diffuse illumination, 2 ∫ R(µ) µ dµ, by the fits that renderers

@@ -1,0 +1,167 @@
+//! Parameters of closures: the slots that they take up.
+
+use super::facets::{Facets, Ggx, TRANSMITTANCE_TERMS, Transmittance};
+use crate::math::lanes::{Lanes, Lanes3};
+
+/// Something that takes up parameters of a closure.
+pub trait Parameter<const N: usize> {
+    /// Number of them.
+    const SLOTS: usize;
+
+    /// Reads it.
+    fn load(from: &[Lanes<N>]) -> Self;
+
+    /// Writes it.
+    fn store(&self, to: &mut [Lanes<N>]);
+}
+
+impl<const N: usize> Parameter<N> for Lanes<N> {
+    const SLOTS: usize = 1;
+
+    #[inline(always)]
+    fn load(from: &[Lanes<N>]) -> Self {
+        from[0]
+    }
+
+    fn store(&self, to: &mut [Lanes<N>]) {
+        to[0] = *self;
+    }
+}
+
+impl<const N: usize> Parameter<N> for Lanes3<N> {
+    const SLOTS: usize = 3;
+
+    #[inline(always)]
+    fn load(from: &[Lanes<N>]) -> Self {
+        Self { x: from[0], y: from[1], z: from[2] }
+    }
+
+    fn store(&self, to: &mut [Lanes<N>]) {
+        (to[0], to[1], to[2]) = (self.x, self.y, self.z);
+    }
+}
+
+impl<const N: usize> Parameter<N> for Facets<N> {
+    const SLOTS: usize = 2;
+
+    /// The sign of the first roughness tells the distribution.
+    #[inline(always)]
+    fn load(from: &[Lanes<N>]) -> Self {
+        Self { ggx: from[0].less(Lanes::ZERO), alpha: [from[0].abs(), from[1]] }
+    }
+
+    fn store(&self, to: &mut [Lanes<N>]) {
+        (to[0], to[1]) = (self.ggx.select(-self.alpha[0], self.alpha[0]), self.alpha[1]);
+    }
+}
+
+impl<const N: usize> Parameter<N> for Ggx<N> {
+    const SLOTS: usize = 2;
+
+    #[inline(always)]
+    fn load(from: &[Lanes<N>]) -> Self {
+        Self { alpha: [from[0], from[1]] }
+    }
+
+    fn store(&self, to: &mut [Lanes<N>]) {
+        [to[0], to[1]] = self.alpha;
+    }
+}
+
+impl<const N: usize> Parameter<N> for Transmittance<N> {
+    const SLOTS: usize = TRANSMITTANCE_TERMS;
+
+    #[inline(always)]
+    fn load(from: &[Lanes<N>]) -> Self {
+        Self { series: std::array::from_fn(|k| from[k]) }
+    }
+
+    fn store(&self, to: &mut [Lanes<N>]) {
+        to[..self.series.len()].copy_from_slice(&self.series);
+    }
+}
+
+/// A struct of parameters that closures of a kind have.
+macro_rules! parameters {
+    ($(#[$about:meta])* $kind:ident { $($(#[$field_about:meta])* $field:ident: $type:ident,)* }) => {
+        $(#[$about])*
+        #[derive(Clone, Copy, Debug)]
+        pub struct $kind<const N: usize = 1> {
+            $($(#[$field_about])* pub $field: $type<N>,)*
+        }
+
+        impl<const N: usize> $kind<N> {
+            /// The parameters of closures, as far as these are of the kind.
+            #[inline(always)]
+            pub(super) fn load(closures: &$crate::scene::closure::Closures<N>) -> Self {
+                let mut left = &closures.parameters[..];
+                $(
+                    let $field = <$type<N> as $crate::scene::closure::parameter::Parameter<N>>::load(left);
+                    left = &left[<$type<N> as $crate::scene::closure::parameter::Parameter<N>>::SLOTS..];
+                )*
+                let _ = left;
+                Self { $($field,)* }
+            }
+        }
+
+        impl $crate::scene::closure::lobes::OfPackets for $kind<{ $crate::math::lanes::LANES }> {
+            fn eval_packet(
+                closures: &$crate::scene::closure::Closures,
+                [wi, wo]: [$crate::math::lanes::Lanes3; 2],
+            ) -> $crate::scene::closure::Evals {
+                #[cfg_attr(
+                    not(baseline),
+                    multiversion::multiversion(targets(
+                        "x86_64+avx512f+avx512bw+avx512dq+avx512vl",
+                        "x86_64+avx2+fma"
+                    ))
+                )]
+                fn eval(
+                    closures: &$crate::scene::closure::Closures,
+                    [wi, wo]: [$crate::math::lanes::Lanes3; 2],
+                ) -> $crate::scene::closure::Evals {
+                    $crate::scene::closure::lobes::Lobes::eval(&$kind::load(closures), wi, wo)
+                }
+                eval(closures, [wi, wo])
+            }
+
+            fn propose_packet(
+                closures: &$crate::scene::closure::Closures,
+                wi: $crate::math::lanes::Lanes3,
+                numbers: &$crate::scene::closure::Numbers,
+            ) -> $crate::scene::closure::Proposals {
+                #[cfg_attr(
+                    not(baseline),
+                    multiversion::multiversion(targets(
+                        "x86_64+avx512f+avx512bw+avx512dq+avx512vl",
+                        "x86_64+avx2+fma"
+                    ))
+                )]
+                fn propose(
+                    closures: &$crate::scene::closure::Closures,
+                    wi: $crate::math::lanes::Lanes3,
+                    numbers: &$crate::scene::closure::Numbers,
+                ) -> $crate::scene::closure::Proposals {
+                    $crate::scene::closure::lobes::Lobes::propose(&$kind::load(closures), wi, numbers)
+                }
+                propose(closures, wi, numbers)
+            }
+        }
+
+        impl $kind {
+            /// A closure with these parameters. `roughness`: the smallest one of its smooth lobes, infinite for diffuse
+            /// ones; `None` without smooth lobes.
+            pub fn closure(&self, roughness: Option<f32>) -> $crate::scene::closure::Closure {
+                let mut parameters = [Lanes::ZERO; $crate::scene::closure::PARAMETERS];
+                let mut first = 0;
+                $(
+                    $crate::scene::closure::parameter::Parameter::store(&self.$field, &mut parameters[first..]);
+                    first += <$type<1> as $crate::scene::closure::parameter::Parameter<1>>::SLOTS;
+                )*
+                $crate::scene::closure::Closure::new($crate::scene::closure::Kind::$kind, &parameters[..first], roughness)
+            }
+        }
+    };
+}
+pub(super) use parameters;
+
