@@ -26,11 +26,17 @@ impl<'a> CameraSamples<'a> {
         Self { sampler, pixels, film: sampler.film(), size: (scene.sensor().width, scene.sensor().height) }
     }
 
+    /// Hash that keeps the random numbers of a pixel of the list apart.
+    pub fn hash(&self, index: usize) -> u32 {
+        let (x, y) = self.pixels[index];
+        self.sampler.hash((y * self.size.0 + x) as u64)
+    }
+
     /// Hashes that keep the random numbers of sixteen pixels apart, from pixel `first` of the list on.
     pub fn hashes(&self, first: usize) -> Bits {
         let mut hashes = Bits::ZERO;
-        for (hash, &(x, y)) in hashes.0.iter_mut().zip(&self.pixels[first..]) {
-            *hash = self.sampler.hash((y * self.size.0 + x) as u64);
+        for (hash, index) in hashes.0.iter_mut().zip(first..self.pixels.len()) {
+            *hash = self.hash(index);
         }
         hashes
     }
@@ -42,6 +48,11 @@ impl<'a> CameraSamples<'a> {
             let film = vec2(x as f32, y as f32) + self.film + step;
             (at[0].0[lane], at[1].0[lane]) = film.into();
         }
+        self.rays_through(scene, at, hashes)
+    }
+
+    /// Camera rays through any sixteen film positions.
+    pub fn rays_through(&self, scene: &Scene, at: [Lanes; 2], hashes: Bits) -> Rays {
         let sensor = scene.sensor();
         let lens = if sensor.has_lens() { self.sampler.lens(hashes) } else { [Lanes::ZERO; 2] };
         sensor.rays(at, lens)

@@ -3,8 +3,9 @@
 use super::paths::Packet;
 use super::vertices::Vertices;
 use crate::math::Rgb;
+use crate::math::vec2;
 use crate::scene::Scene;
-use crate::scene::emitter::LightPoint;
+use crate::scene::emitter::{EnvmapHits, LightPoint};
 
 /// An emitter that a path has hit.
 pub struct EmitterHit {
@@ -18,16 +19,31 @@ pub struct EmitterHit {
     pub color: Rgb,
 }
 
-/// The emitter at the end of a path's latest segment: the surface that it has hit if `hit`, else the environment.
-pub fn emitter_hit(scene: &Scene, packet: &Packet, vertices: &Vertices, lane: usize, hit: bool) -> Option<EmitterHit> {
+/// The emitter at the end of a path's latest segment: the surface that it has hit if `hit`, else the environment, which is
+/// looked up already if it is an image.
+pub fn emitter_hit(
+    scene: &Scene,
+    packet: &Packet,
+    (vertices, lane): (&Vertices, usize),
+    (hit, envmap): (bool, Option<&EnvmapHits>),
+) -> Option<EmitterHit> {
     let direction = packet.rays.direction.get(lane);
-    let point = if hit { scene.light_point_of(&vertices.surfaces, lane) } else { scene.environment(direction) }?;
-    let radiance = scene.radiance(&point, -direction);
+    let envmap = envmap.filter(|_| !hit);
+    let (mut point, looked_up) = match envmap {
+        Some(envmap) => (scene.far_point(direction)?, Some((envmap.radiance.get(lane), envmap.pdf.0[lane]))),
+        None if hit => (scene.light_point_of(&vertices.surfaces, lane)?, None),
+        None => (scene.environment(direction)?, None),
+    };
+    if let Some(envmap) = envmap {
+        point.at.uv = vec2(envmap.uv[0].0[lane], envmap.uv[1].0[lane]);
+    }
+    let radiance = looked_up.map_or_else(|| scene.radiance(&point, -direction), |(radiance, _)| radiance);
     if radiance == Rgb::ZERO {
         return None;
     }
     let smooth = packet.smooth.get(lane);
-    let light_pdf = if smooth { scene.emitter_pdf(packet.from.get(lane), &point) } else { 0.0 };
+    let density = || looked_up.map_or_else(|| scene.emitter_pdf(packet.from.get(lane), &point), |(_, pdf)| pdf);
+    let light_pdf = if smooth { density() } else { 0.0 };
     // Power heuristic with exponent two.
     let ratio = light_pdf / packet.pdf.0[lane];
     let color = packet.throughput.get(lane) * radiance / (1.0 + ratio * ratio);

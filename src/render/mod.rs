@@ -3,6 +3,7 @@
 //! ```text
 //! schedule (tiles, rounds) -> wave -+- tracer: camera, direct, emission, continuation -> record
 //!                                   +- gradient: shift mappings -> differences of the record's samples
+//!                                   +- seen: emitters at the ends of camera rays -> their light in the samples
 //! ```
 
 mod camera;
@@ -15,6 +16,7 @@ mod paths;
 mod record;
 mod sampler;
 mod schedule;
+mod seen;
 mod tracer;
 mod vertices;
 mod wave;
@@ -27,7 +29,8 @@ pub use self::schedule::{
     Budget, CheckpointSink, Control, RenderOutcome, RenderSettings, render, render_to_counts, resume, sample,
 };
 
-/// One sample of one pixel, the same whenever and wherever it is asked for.
+/// One sample of one pixel, the same whenever and wherever it is asked for, but for directly seen light that is
+/// [refined](seen).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SampleId {
     /// The render's seed.

@@ -1,8 +1,7 @@
 //! Paths between two vertices, packed sixteen by sixteen, so that terminated paths leave no gaps.
 
-use crate::ffi::embree::Hits;
 use crate::math::lanes::{Bits, LANES, Lanes, Lanes3, Mask};
-use crate::scene::packet::Rays;
+use crate::scene::packet::{Hits, Rays};
 
 /// Sixteen paths between two vertices.
 #[derive(Clone)]

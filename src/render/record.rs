@@ -49,9 +49,13 @@ impl PathRecord {
     ) {
         let emissive = hit & vertices.surfaces.emissive;
         let ends = if scene.has_environment() { active & (!hit | emissive) } else { active & emissive };
+        let envmap = scene.envmap_hits(&packet.rays, ends & !hit);
         for lane in ends.lanes() {
             let id = packet.id.0[lane] as usize;
-            let Some(found) = emission::emitter_hit(scene, packet, vertices, lane, hit.get(lane)) else { continue };
+            let Some(found) = emission::emitter_hit(scene, packet, (vertices, lane), (hit.get(lane), envmap.as_ref()))
+            else {
+                continue;
+            };
             if depth == 0 {
                 let hidden = scene.integrator().hide_emitters;
                 self.samples[id].direct = if hidden { Rgb::ZERO } else { found.radiance };

@@ -59,6 +59,13 @@ impl Sampler {
         vec2(x.0[0], y.0[0])
     }
 
+    /// Positions within cells of pixels of these hashes, and hashes for the lens there; `cell` numbers the cells.
+    #[inline(always)]
+    pub fn cell(&self, hashes: Bits, cell: Bits) -> ([Lanes; 2], Bits) {
+        let hashes = part(hashes, u32::MAX).zip(cell, |hash, cell| mix(hash ^ mix(cell)));
+        (self.pair(hashes), hashes)
+    }
+
     /// Positions on the lens for pixels of these hashes.
     #[inline(always)]
     pub fn lens(&self, hashes: Bits) -> [Lanes; 2] {

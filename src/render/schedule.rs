@@ -224,7 +224,7 @@ fn run_tile(
         .collect();
     let due = || spans.iter().filter(|span| !span.is_empty());
     let (start, end) = (due().map(|span| span.start).min(), due().map(|span| span.end).max());
-    let (mut numbers, mut pixels) = (Vec::new(), Vec::new());
+    let (mut numbers, mut pixels, mut grids) = (Vec::new(), Vec::new(), Vec::new());
     let start = start.unwrap_or(0);
     for index in start..end.unwrap_or(0) {
         if index - start >= SOON && stop.load(Ordering::Relaxed) {
@@ -234,7 +234,11 @@ fn run_tile(
         numbers.extend((0..spans.len()).filter(|&pixel| spans[pixel].contains(&index)));
         pixels.clear();
         pixels.extend(numbers.iter().map(|&pixel| tile.pixel(pixel)));
-        let samples = wave.trace(settings.seed, settings.first + index, &pixels);
+        grids.clear();
+        if tile.sees_emitters() {
+            grids.extend(numbers.iter().map(|&pixel| tile.direct_grid(pixel)));
+        }
+        let samples = wave.trace(settings.seed, settings.first + index, &pixels, &grids);
         for ((&pixel, &(x, y)), sample) in numbers.iter().zip(&pixels).zip(samples) {
             if let Err(reason) = tile.add(pixel, sample) {
                 first_rejected
@@ -250,7 +254,7 @@ pub fn sample(scene: &Scene, id: SampleId, shift: Shift) -> Sample {
     let (x, y) = (id.x / TILE * TILE, id.y / TILE * TILE);
     let (width, height) = (TILE.min(scene.sensor().width - x), TILE.min(scene.sensor().height - y));
     let pixels: Vec<_> = (0..width * height).map(|pixel| (x + pixel % width, y + pixel / width)).collect();
-    Wave::new(scene, Needs::ALL, shift).trace(id.seed, id.index, &pixels)[(id.y - y) * width + id.x - x]
+    Wave::new(scene, Needs::ALL, shift).trace(id.seed, id.index, &pixels, &[])[(id.y - y) * width + id.x - x]
 }
 
 #[cfg(test)]

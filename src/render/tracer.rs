@@ -1,16 +1,16 @@
 //! The path tracer: follows the paths of a wave from vertex to vertex, all of them together.
 
+use super::Sampler;
 use super::camera::CameraSamples;
 use super::continuation::shade;
-use super::Sampler;
 use super::paths::{Order, Packet, Paths};
 use super::record::PathRecord;
 use super::vertices::Vertices;
-use crate::ffi::embree::Hits;
 use crate::film::Needs;
 use crate::math::lanes::{LANES, Lanes, Lanes3, Mask};
 use crate::math::{Rgb, Vec2};
 use crate::scene::closure::KINDS;
+use crate::scene::packet::Hits;
 use crate::scene::{Integrator, Scene};
 
 /// Traces waves of paths; keeps its memory between them.

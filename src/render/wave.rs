@@ -4,11 +4,13 @@ use super::camera::CameraSamples;
 use super::features;
 use super::gradient::{Shift, ShiftMapping};
 use super::record::PathRecord;
+use super::seen;
 use super::tracer::PathTracer;
 use crate::film::{Differences, Needs, Sample};
 use crate::math::lanes::LANES;
 use crate::math::{Vec2, vec2};
 use crate::scene::Scene;
+use crate::scene::packet::Surfaces;
 
 /// Takes samples, wave after wave; keeps its memory between them.
 pub struct Wave<'a> {
@@ -16,6 +18,7 @@ pub struct Wave<'a> {
     shift: Option<Box<dyn ShiftMapping>>,
     record: PathRecord,
     occlusion: bool,
+    surfaces: Surfaces,
 }
 
 impl<'a> Wave<'a> {
@@ -26,17 +29,22 @@ impl<'a> Wave<'a> {
             shift: needs.edges.is_sampled().then(|| shift.mapping(needs.ambient)),
             record: PathRecord::default(),
             occlusion: needs.occlusion,
+            surfaces: Surfaces::default(),
         }
     }
 
-    /// Sample number `index` of some pixels, in their order.
-    pub fn trace(&mut self, seed: u64, index: u32, pixels: &[(usize, usize)]) -> &[Sample] {
+    /// Sample number `index` of some pixels, in their order. `grids`: the number of cells along a pixel's side over which
+    /// directly seen light is averaged, for every pixel; empty for single rays.
+    pub fn trace(&mut self, seed: u64, index: u32, pixels: &[(usize, usize)], grids: &[u32]) -> &[Sample] {
         let camera = CameraSamples::new(self.tracer.scene, seed, index, pixels);
         let keep_all = self.shift.as_ref().is_some_and(|shift| shift.needs_vertices());
         self.tracer.trace(&camera, Vec2::ZERO, keep_all, &mut self.record);
         if let Some(shift) = &mut self.shift {
             self.record.samples.iter_mut().for_each(|sample| sample.differences = Some(Differences::default()));
             shift.shift(&mut self.tracer, &camera, &mut self.record);
+        }
+        if grids.iter().any(|&side| side > 1) {
+            seen::refine(self.tracer.scene, &camera, grids, &mut self.record.samples, &mut self.surfaces);
         }
         if self.occlusion {
             for (first, samples) in self.record.samples.chunks_mut(LANES).enumerate() {

@@ -225,6 +225,11 @@ impl Scene {
         Some(LightPoint { emitter, ..self.emitters[emitter as usize].environment_point(direction) })
     }
 
+    /// A point of the environment in a direction, if there is one; its texture coordinates are left to the caller.
+    pub fn far_point(&self, direction: Vec3) -> Option<LightPoint> {
+        Some(LightPoint::at_infinity(direction, self.environment?))
+    }
+
     /// The camera.
     pub fn sensor(&self) -> &Sensor {
         &self.sensor

@@ -3,8 +3,11 @@
 
 use std::f32::consts::{PI, TAU};
 
+use fluxion::math::lanes::{LANES, Lanes, Lanes3, Mask};
 use fluxion::math::{Rgb, Vec2, Vec3, rng, vec2, vec3};
 use fluxion::scene::bsdf::{Bsdf, Lobe, PLUGINS};
+use fluxion::scene::closure::Scatters;
+use fluxion::scene::packet::{Materials, Surfaces};
 use fluxion::scene::{Ray, Scene, Surface};
 
 /// Name of the plugin that a case is of, and its XML.
@@ -261,6 +264,46 @@ fn reflection_is_reciprocal() {
             assert!(forward.distance(back) <= 1e-3 * (forward.length() + 1e-3), "{name}: {forward} {back}");
         }
     });
+}
+
+/// Any direction.
+fn direction(i: u64, k: u64) -> Vec3 {
+    let (z, phi) = (2.0 * uniform(i, k) - 1.0, TAU * uniform(i, k + 1));
+    vec3((1.0 - z * z).sqrt() * phi.cos(), (1.0 - z * z).sqrt() * phi.sin(), z)
+}
+
+/// Materials in packets, sixteen different directions at a time, to the bit what they are one by one: so all that is tested
+/// here holds for both.
+#[test]
+fn packets_scatter_as_single_surfaces_do() {
+    for (name, xml) in CASES {
+        let (scene, surface) = surface(xml, Vec3::Z);
+        let bsdf = scene.bsdf(&surface);
+        let (mut surfaces, mut materials, mut scatters) =
+            (Surfaces::default(), Materials::default(), Scatters::default());
+        for packet in 0..200u64 {
+            let number = |lane: usize| packet * LANES as u64 + lane as u64;
+            let single: Vec<_> = (0..LANES).map(|i| Surface { wi: direction(number(i), 11), ..surface }).collect();
+            single.iter().enumerate().for_each(|(lane, surface)| surfaces.set(lane, surface));
+            let numbers = |k: u64| Lanes(std::array::from_fn(|lane| uniform(number(lane), k)));
+            let wo: Vec<_> = (0..LANES).map(|lane| direction(number(lane), 13)).collect();
+            let mut many = Lanes3::ZERO;
+            wo.iter().enumerate().for_each(|(lane, wo)| many.set(lane, *wo));
+            let active = !Mask(std::array::from_fn(|lane| if (number(lane) % 7) == 0 { !0 } else { 0 }));
+            materials.evaluate(&scene, &surfaces, active);
+            let evals = materials.eval(&scene, &surfaces, (surfaces.wi, many), active);
+            let (lobe, u) = (numbers(15), [numbers(16), numbers(17)]);
+            let found = materials.sample(&scene, &surfaces, (lobe, u), active, &mut scatters);
+            for lane in active.lanes() {
+                let (surface, eval) = (&single[lane], evals.get(lane));
+                let expected = bsdf.eval(surface, surface.wi, wo[lane]);
+                assert_eq!((eval.value, eval.pdf), (expected.value, expected.pdf), "{name} {}", surface.wi);
+                let sample = bsdf.sample(surface, surface.wi, lobe.0[lane], vec2(u[0].0[lane], u[1].0[lane]));
+                let of_packet = found.get(lane).then(|| scatters.get(lane));
+                assert_eq!(format!("{of_packet:?}"), format!("{sample:?}"), "{name} {}", surface.wi);
+            }
+        }
+    }
 }
 
 #[test]

@@ -100,7 +100,7 @@ fn the_plan_says_what_a_scene_can_do_without() {
         plan.items.iter().find(|item| item.name == name).unwrap().computed
     };
     for (what, without, with) in [
-        ("materials", "unit/diffuse", "unit/rough-plastic"),
+        ("materials", "unit/diffuse", "unit/thin-pane"),
         ("half-vectors", "unit/diffuse", "unit/dielectric"),
         ("derivatives", "unit/diffuse", "unit/bump"),
         ("environment", "unit/diffuse", "unit/environment"),

@@ -8,6 +8,7 @@ use crate::math::lanes::{LANES, Lanes, Lanes3, Mask};
 use crate::math::quadrature::gauss_legendre;
 use crate::math::{Rgb, Vec2, Vec3, vec2, vec3};
 use crate::scene::closure::facets::{Facets, Ggx, Transmittance};
+use crate::scene::closure::visible_facets;
 use crate::scene::load::Loader;
 use crate::scene::load::props::Object;
 use crate::scene::texture::{Point, Texture};
@@ -154,7 +155,8 @@ impl RoughTransmittance {
     pub fn new(facets: Microfacet, eta: f32) -> Self {
         let rule = gauss_legendre(QUADRATURE);
         let [nodes, weights] = [0, 1].map(|k| rule.iter().map(|node| [node.0, node.1][k]).collect::<Vec<f32>>());
-        let facets = Facets { ggx: Mask([facets.facets().ggx.0[0]; LANES]), alpha: facets.alpha.to_array().map(Lanes::splat) };
+        let facets =
+            Facets { ggx: Mask([facets.facets().ggx.0[0]; LANES]), alpha: facets.alpha.to_array().map(Lanes::splat) };
         let transmitted = |wi: Lanes3, m: Lanes3| {
             let found = fresnel::dielectric(wi.dot(m), Lanes::splat(eta));
             let wo = fresnel::refract_about(wi, m, &found);
@@ -170,7 +172,7 @@ impl RoughTransmittance {
             let wi = Lanes3::splat(vec3((1.0 - mu * mu).max(0.0).sqrt(), 0.0, mu));
             let packet = |first: usize, v: f32| {
                 let (u, weight): (Lanes, Lanes) = (Lanes::load(&nodes[first..]), Lanes::load(&weights[first..]));
-                (weight * term(wi, facets.sample_visible(wi, [u, Lanes::splat(v)]))).sum()
+                (weight * term(wi, visible_facets(&facets, wi, [u, Lanes::splat(v)]))).sum()
             };
             rule.iter().map(|&(v, weight)| weight * (packet(0, v) + packet(LANES, v))).sum::<f32>()
         };

@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use super::{Bsdf, Whole};
 use super::conductor::Metal;
 use super::microfacet::Roughness;
+use super::{Bsdf, Whole};
 use crate::error::Result;
 use crate::math::Rgb;
 use crate::scene::Surface;

@@ -23,6 +23,7 @@ impl<const N: usize> Lobes<N> for Diffuse<N> {
     fn propose(&self, wi: Lanes3<N>, numbers: &Numbers<N>) -> Proposals<N> {
         let wo = numbers.cosine;
         let possible = wi.z.greater(Lanes::ZERO) & wo.z.greater(Lanes::ZERO);
-        (Scatters::towards(wo, Lanes::ONE), possible)
+        let pdf = warp::cosine_hemisphere_pdfs(wo.z);
+        (Scatters { weight: self.reflectance, pdf, ..Scatters::towards(wo, Lanes::ONE) }, possible)
     }
 }

@@ -243,7 +243,7 @@ pub struct Transmittance<const N: usize = LANES> {
     pub series: [Lanes<N>; TRANSMITTANCE_TERMS],
 }
 
-/// Number of coefficients of a [`Transmittance`]: smooth interfaces, which bend most, are right to 1e-4.
+/// Number of coefficients of a [`Transmittance`]: those of smooth interfaces are right to 1e-4.
 pub const TRANSMITTANCE_TERMS: usize = 8;
 
 /// The cosine's scale: near grazing the transmittance changes quickly.

@@ -80,16 +80,17 @@ where
                 facets = facets.replaced(&of_kind, lanes);
             }
         });
-        let mut numbers =
-            Numbers { lobe, facet: Lanes3::UP, cosine: warp::cosine_hemisphere_lanes([u, v]), u: [u, v] };
+        let mut numbers = Numbers { lobe, facet: Lanes3::UP, cosine: warp::cosine_hemisphere_lanes([u, v]), u: [u, v] };
         if rough.any() {
             numbers.facet = Self::visible_facets(&facets, wi * Lanes::ONE.copysign(wi.z), [u, v]);
         }
         let (mut scatters, possible) = self.propose_lobes(wi, &numbers, active);
-        let smooth = possible & scatters.are(Lobe::Smooth);
-        let evals = self.eval_lobes([wi, scatters.wo], smooth);
-        scatters.weight = smooth.select3(evals.value * (Lanes::ONE / evals.pdf), scatters.weight);
-        scatters.pdf = smooth.select(evals.pdf, scatters.pdf);
+        let left = possible & !scatters.pdf.greater(Lanes::ZERO) & scatters.are(Lobe::Smooth);
+        if left.any() {
+            let evals = self.eval_lobes([wi, scatters.wo], left);
+            scatters.weight = left.select3(evals.value * (Lanes::ONE / evals.pdf), scatters.weight);
+            scatters.pdf = left.select(evals.pdf, scatters.pdf);
+        }
         (scatters, possible & scatters.pdf.greater(Lanes::ZERO))
     }
 }
@@ -132,11 +133,12 @@ impl AllLobes<LANES> for Closures {
     }
 }
 
+/// Normals of the visible facets of packets, in the widest vectors that there are.
 #[cfg_attr(
     not(baseline),
     multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))
 )]
-fn visible_facets(facets: &Facets, wi: Lanes3, u: [Lanes; 2]) -> Lanes3 {
+pub fn visible_facets(facets: &Facets, wi: Lanes3, u: [Lanes; 2]) -> Lanes3 {
     facets.sample_visible(wi, u)
 }
 

@@ -20,6 +20,7 @@ mod thin;
 pub use self::conductor::{Conductor, RoughConductor};
 pub use self::dielectric::{Dielectric, RoughDielectric};
 pub use self::diffuse::Diffuse;
+pub use self::lobes::visible_facets;
 use self::lobes::{AllLobes, Lobes};
 use self::parameter::parameters;
 pub use self::perturbation::Perturbation;
@@ -242,12 +243,7 @@ impl<const N: usize> Closures<N> {
 
     /// [`Closures::sample`] where all active lanes are plainly diffuse.
     #[inline(always)]
-    pub fn sample_diffuse(
-        &self,
-        wi: Lanes3<N>,
-        u: [Lanes<N>; 2],
-        active: Mask<N>,
-    ) -> Draws<N> {
+    pub fn sample_diffuse(&self, wi: Lanes3<N>, u: [Lanes<N>; 2], active: Mask<N>) -> Draws<N> {
         let behind = self.behind(wi);
         let wo = warp::cosine_hemisphere_lanes(u);
         let found = active & wi.mirror(behind).z.greater(Lanes::ZERO) & wo.z.greater(Lanes::ZERO);
@@ -255,7 +251,6 @@ impl<const N: usize> Closures<N> {
         let weight = Diffuse::load(self).reflectance;
         (Scatters { weight, pdf, ..Scatters::towards(wo.mirror(behind), Lanes::ONE) }, found)
     }
-
 }
 
 impl<const N: usize> Closures<N>
@@ -283,12 +278,7 @@ where
 
     /// Samples directions for the active lanes; returns the lanes that have one.
     #[inline(always)]
-    pub fn sample(
-        &self,
-        from: Lanes3<N>,
-        (lobe, u): (Lanes<N>, [Lanes<N>; 2]),
-        active: Mask<N>,
-    ) -> Draws<N> {
+    pub fn sample(&self, from: Lanes3<N>, (lobe, u): (Lanes<N>, [Lanes<N>; 2]), active: Mask<N>) -> Draws<N> {
         let behind = self.behind(from);
         let mut wi = from.mirror(behind);
         let perturbed = active & self.perturbation.lanes;

@@ -164,4 +164,3 @@ macro_rules! parameters {
     };
 }
 pub(super) use parameters;
-

@@ -1,4 +1,4 @@
-//! What closures say of directions: values and densities, sampled directions, delta lobes.
+//! Results of closures: values and densities, sampled directions, delta lobes.
 
 use crate::math::lanes::{Bits, LANES, Lanes, Lanes3, Mask};
 use crate::scene::bsdf::{BsdfSample, Delta, Eval, Lobe};
@@ -32,11 +32,11 @@ pub struct Scatters<const N: usize = LANES> {
 /// Sampled directions, and the lanes that have one.
 pub type Draws<const N: usize = LANES> = (Scatters<N>, Mask<N>);
 
-/// Directions that lobes propose, and the lanes that have one. Of smooth lobes, weights and densities are still to be
-/// evaluated, of all lobes together.
+/// Directions that lobes propose, and the lanes that have one. Where the density is zero, weights and densities are still to
+/// be evaluated, of all smooth lobes together.
 pub type Proposals<const N: usize = LANES> = (Scatters<N>, Mask<N>);
 
-/// What lobes propose directions by.
+/// Random numbers that lobes propose directions by, mapped to normals and directions.
 #[derive(Clone, Copy)]
 pub struct Numbers<const N: usize = LANES> {
     /// Numbers that select the lobe.
@@ -91,7 +91,7 @@ impl<const N: usize> Evals<N> {
         self.pdf.0[lane] = pdf;
     }
 
-    /// Those of one lane.
+    /// Value and density of one lane.
     pub fn get(&self, lane: usize) -> Eval {
         Eval { value: self.value.get(lane), pdf: self.pdf.0[lane] }
     }

@@ -68,11 +68,7 @@ pub fn diffuse<const N: usize>(
 
 /// The sheen of cloth, without the cosine.
 #[inline(always)]
-pub fn sheen<const N: usize>(
-    base: Lanes3<N>,
-    (sheen, sheen_tint): (Lanes<N>, Lanes<N>),
-    cos_d: Lanes<N>,
-) -> Lanes3<N> {
+pub fn sheen<const N: usize>(base: Lanes3<N>, (sheen, sheen_tint): (Lanes<N>, Lanes<N>), cos_d: Lanes<N>) -> Lanes3<N> {
     Lanes3::ONE.lerp(tint(base), sheen_tint) * (sheen * schlick_weight(cos_d.abs()))
 }
 

@@ -63,7 +63,30 @@ pub struct EnvmapSample {
     pub radiance: Lanes3,
 }
 
+/// Sixteen rays that end on an environment image.
+pub struct EnvmapHits {
+    /// Texture coordinates.
+    pub uv: [Lanes; 2],
+    /// Densities per solid angle of [`Emitter::sample`].
+    pub pdf: Lanes,
+    /// Radiance they receive.
+    pub radiance: Lanes3,
+}
+
 impl EnvMap {
+    /// The image along the directions of the active lanes, as [`Emitter::environment_point`].
+    #[inline(always)]
+    pub fn hits(&self, directions: Lanes3, active: Mask) -> EnvmapHits {
+        let uv = self.uv(directions);
+        let (mut pdf, mut radiance) = (Lanes::ZERO, Lanes3::ZERO);
+        for lane in active.lanes() {
+            let at = vec2(uv[0].0[lane], uv[1].0[lane]);
+            pdf.0[lane] = self.partition.as_ref().map_or(0.0, |partition| partition.pdf(at));
+            radiance.set(lane, self.look_up(at));
+        }
+        EnvmapHits { uv, pdf: per_solid_angle(pdf, uv[1]), radiance }
+    }
+
     /// [`Emitter::sample`] with density and radiance, for the active ones.
     #[inline(always)]
     pub fn sample_packet(&self, [u, v]: [Lanes; 2], active: Mask) -> EnvmapSample {
@@ -79,10 +102,9 @@ impl EnvMap {
         let (cos_phi, sin_phi) = x.cos_sin_turns();
         let (cos, sin) = (y * Lanes::splat(0.5)).cos_sin_turns();
         let local = Lanes3 { x: sin_phi * sin, y: cos, z: -cos_phi * sin };
-        let axis = |column: Vec4| Lanes3::splat(column.truncate());
-        let [right, up, back] = [self.to_world.x_axis, self.to_world.y_axis, self.to_world.z_axis].map(axis);
+        let [right, up, back] = axes(self.to_world);
         sample.direction = (right * local.x + up * local.y + back * local.z).normalize_or(Lanes3::ZERO);
-        sample.pdf = cell_pdf / (Lanes::splat(2.0 * PI * PI) * sin.max(Lanes::splat(1e-6)));
+        sample.pdf = per_solid_angle(cell_pdf, y);
         sample
     }
 
@@ -106,9 +128,15 @@ impl EnvMap {
         Self { texels, scale, to_world, to_local, partition: Partition::new(&weights, width), mean, area: 1.0 }
     }
 
-    fn uv(&self, direction: Vec3) -> Vec2 {
-        let d = self.to_local.transform_vector3(direction).normalize_or(Vec3::Y);
-        vec2((d.x.atan2(-d.z) / TAU).rem_euclid(1.0), d.y.clamp(-1.0, 1.0).acos() * FRAC_1_PI)
+    /// Texture coordinates of directions.
+    #[inline(always)]
+    fn uv<const N: usize>(&self, directions: Lanes3<N>) -> [Lanes<N>; 2] {
+        let [right, up, back] = axes(self.to_local);
+        let d = right * directions.x + up * directions.y + back * directions.z;
+        let turns = Lanes::atan2(d.x, -d.z) * Lanes::splat(1.0 / TAU);
+        let u = turns.less(Lanes::ZERO).select(turns + Lanes::ONE, turns);
+        let v = Lanes::atan2((d.x * d.x + d.z * d.z).sqrt(), d.y) * Lanes::splat(FRAC_1_PI);
+        [u.min(Lanes::splat(ALMOST_ONE)), v]
     }
 
     /// Columns have their centres at half numbers and wrap around; the first and last row are the poles.
@@ -124,6 +152,23 @@ impl EnvMap {
         let [a, b, c, d] = self.texels.square([left, right], [y, y + 1]);
         a.lerp(b, at.x - x).lerp(c.lerp(d, at.x - x), at.y - y as f32) * self.scale
     }
+}
+
+/// The largest number below one.
+const ALMOST_ONE: f32 = 1.0 - 0.5 * f32::EPSILON;
+
+/// Columns of the part of a transform that acts on directions.
+#[inline(always)]
+fn axes<const N: usize>(transform: Mat4) -> [Lanes3<N>; 3] {
+    let axis = |column: Vec4| Lanes3::splat(column.truncate());
+    [axis(transform.x_axis), axis(transform.y_axis), axis(transform.z_axis)]
+}
+
+/// Densities over the unit square, per solid angle at the given rows.
+#[inline(always)]
+fn per_solid_angle<const N: usize>(pdf: Lanes<N>, v: Lanes<N>) -> Lanes<N> {
+    let (_, sine) = (v * Lanes::splat(0.5)).cos_sin_turns();
+    pdf / (Lanes::splat(2.0 * PI * PI) * sine.max(Lanes::splat(1e-6)))
 }
 
 /// A point of the environment keeps its texel, since it is looked up more than once.
@@ -142,14 +187,14 @@ impl Emitter for EnvMap {
     }
 
     fn environment_point(&self, direction: Vec3) -> LightPoint {
-        far(direction, self.uv(direction))
+        let [u, v] = self.uv::<1>(Lanes3::splat(direction));
+        far(direction, vec2(u.0[0], v.0[0]))
     }
 
     fn pdf(&self, _from: Vec3, point: &LightPoint) -> f32 {
         let (Position::Infinity { .. }, Some(partition)) = (point.position, &self.partition) else { return 0.0 };
         let uv = point.at.uv;
-        let sine = (PI * uv.y).sin().max(1e-6);
-        partition.pdf(uv) / (2.0 * PI * PI * sine)
+        per_solid_angle::<1>(Lanes([partition.pdf(uv)]), Lanes([uv.y])).0[0]
     }
 
     fn radiance(&self, point: &LightPoint, _direction: Vec3) -> Rgb {

@@ -15,7 +15,7 @@ mod tree;
 
 pub use self::area::Area;
 pub use self::choice::Choice;
-pub use self::envmap::EnvMap;
+pub use self::envmap::{EnvMap, EnvmapHits};
 pub use self::tree::Extent;
 use super::load::Plugin;
 use super::shape::Geometry;

@@ -4,7 +4,7 @@ use super::info::{LightTriangle, UniformMeshLight};
 use super::{Rays, Surfaces, surfaces};
 use crate::math::lanes::{Bits, LANES, Lanes, Lanes3, Mask};
 use crate::math::{Rgb, Vec3, vec2};
-use crate::scene::emitter::{LightPoint, Position};
+use crate::scene::emitter::{EnvMap, EnvmapHits, LightPoint, Position};
 use crate::scene::{Scene, accel};
 
 /// Emitter points, as [`LightPoint`] has them.
@@ -245,6 +245,30 @@ impl Scene {
         pdf
     }
 
+    /// Radiance that active rays receive from emitters at their ends: surfaces where they `hit` any, else the environment.
+    pub fn seen_radiance(&self, rays: &Rays, surfaces: &Surfaces, (active, hit): (Mask, Mask)) -> Lanes3 {
+        let envmap = self.envmap_hits(rays, active & !hit);
+        let mut seen = envmap.map_or(Lanes3::ZERO, |envmap| (active & !hit).select3(envmap.radiance, Lanes3::ZERO));
+        let others = if self.envmap.is_some() { hit } else { active };
+        for lane in (others & (!hit | surfaces.emissive)).lanes() {
+            let direction = rays.direction.get(lane);
+            let point = if hit.get(lane) { self.light_point_of(surfaces, lane) } else { self.environment(direction) };
+            seen.set(lane, point.map_or(Rgb::ZERO, |point| self.radiance(&point, -direction)));
+        }
+        seen
+    }
+
+    /// The environment image along active rays that have hit nothing, with the density with which [`Scene::sample_lights`]
+    /// finds its points; `None` if the environment is no image.
+    pub fn envmap_hits(&self, rays: &Rays, active: Mask) -> Option<EnvmapHits> {
+        let index = self.envmap.filter(|_| active.any())? as usize;
+        let mut hits = envmap_hits(self.emitters[index].envmap()?, rays, active);
+        // Emitters at infinity are chosen with the same chance everywhere.
+        let chance = self.emitter_choice.as_ref().map_or(0.0, |choice| choice.probability(Vec3::ZERO, index));
+        hits.pdf = hits.pdf * Lanes::splat(chance);
+        Some(hits)
+    }
+
     /// Active lanes whose emitter point is visible from the surface.
     pub fn visible_packet(&self, from: &Surfaces, lights: &Lights, active: Mask) -> Mask {
         active & !self.accel.occluded_packet(&shadow_rays(self.accel.size(), from, lights), active)
@@ -262,6 +286,15 @@ impl Scene {
             _ => lights.set(lane, point, self.emitter_infos[point.emitter as usize].mesh_light.is_some()),
         }
     }
+}
+
+/// [`EnvMap::hits`] in the widest vectors that there are.
+#[cfg_attr(
+    not(baseline),
+    multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))
+)]
+fn envmap_hits(map: &EnvMap, rays: &Rays, active: Mask) -> EnvmapHits {
+    map.hits(rays.direction, active)
 }
 
 #[cfg_attr(

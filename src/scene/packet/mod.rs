@@ -13,4 +13,4 @@ pub(super) use self::info::{EmitterInfo, ShapeInfo};
 pub use self::lights::Lights;
 pub use self::materials::Materials;
 pub use self::rays::Rays;
-pub use self::surfaces::{Frames, Surfaces};
+pub use self::surfaces::{Frames, Hits, Surfaces};

@@ -1,12 +1,12 @@
 //! Sixteen surfaces.
 
 use super::{Rays, ShapeInfo};
-use crate::ffi::embree::Hits;
+pub use crate::ffi::embree::Hits;
 use crate::math::lanes::{Bits, LANES, Lanes, Lanes3, Mask};
 use crate::math::{Frame, Vec3, vec2};
+use crate::scene::closure::KINDS;
 use crate::scene::emitter::LightPoint;
 use crate::scene::shape::Geometry;
-use crate::scene::closure::KINDS;
 use crate::scene::{Scene, Shape, Surface, accel, surface, texture};
 
 /// Sixteen orthonormal frames.
