@@ -136,24 +136,6 @@ impl Hit {
 }
 
 impl Hits {
-    /// No hits.
-    pub const NONE: Self = Self {
-        t: [0.0; 16],
-        u: [0.0; 16],
-        v: [0.0; 16],
-        geometry: [raw::FLUXION_NO_GEOMETRY; 16],
-        primitive: [0; 16],
-        instance: [raw::FLUXION_NO_GEOMETRY; 16],
-    };
-
-    /// Copies one lane of other hits.
-    #[inline(always)]
-    pub fn copy(&mut self, to: usize, from: &Self, lane: usize) {
-        (self.t[to], self.u[to], self.v[to]) = (from.t[lane], from.u[lane], from.v[lane]);
-        self.geometry[to] = from.geometry[lane];
-        (self.primitive[to], self.instance[to]) = (from.primitive[lane], from.instance[lane]);
-    }
-
     /// First intersection of a ray, if any.
     #[inline]
     pub fn get(&self, lane: usize) -> Option<Hit> {

@@ -1,21 +1,7 @@
 //! A square of the film: statistics of its pixels.
 
-use super::statistic::{Ordinal, Record, STATISTICS};
+use super::statistic::{Ordinal, STATISTICS};
 use super::{Needs, Rejected, Sample};
-use crate::math::{Rgb, luminance};
-
-/// Cost of a camera ray, in path samples.
-const CELL: f32 = 0.05;
-/// Largest number of cells along a pixel's side.
-const LARGEST_GRID: u32 = 4;
-/// Standard deviation of a sample that is usual where light is scattered, over its mean.
-const USUAL_DEVIATION: f32 = 0.5;
-
-/// Mean of a luminance, and variance of a single sample of it.
-struct Luminance {
-    mean: f32,
-    variance: f32,
-}
 
 /// Statistics of a tile's pixels, row by row. A tile has one writer at a time, so there are no locks.
 #[derive(Clone, Debug, PartialEq)]
@@ -105,46 +91,6 @@ impl Tile {
         if let (Some(count), true) = (self.edge_counts.get_mut(index), sample.differences.is_some()) {
             *count += 1;
         }
-    }
-
-    /// Whether the camera has seen an emitter anywhere in the tile.
-    pub fn sees_emitters(&self) -> bool {
-        !self.planes[Record::Direct as usize].is_empty()
-    }
-
-    /// Cells along the side of pixel `index` over which its next sample of directly seen light had best be averaged. With n
-    /// cells of a cost c in path samples the error for the time, (V_d / n + V) (1 + n c) by the variances of directly seen
-    /// light and of everything else, is least at n = √(V_d / (V c)). Pixels that see nothing else share their time with those
-    /// that do, so that V is at least what is usual there.
-    pub fn direct_grid(&self, index: usize) -> u32 {
-        let count = self.count(index);
-        if count == 0 {
-            return 1;
-        }
-        let (direct, color) = (self.luminance(Record::Direct, index), self.luminance(Record::Color, index));
-        let (x, y) = (index % self.width, index / self.width);
-        let mut step = 0.0f32;
-        for y in y.saturating_sub(1)..(y + 2).min(self.height) {
-            for near in (x.saturating_sub(1)..(x + 2).min(self.width)).map(|x| y * self.width + x) {
-                if self.count(near) > 0 {
-                    step = step.max((self.luminance(Record::Direct, near).mean - direct.mean).abs());
-                }
-            }
-        }
-        // An edge between two pixels may pass through this one: a twentieth of its area on the other side, say.
-        let variance = direct.variance.max(0.05 * step * step);
-        let usual = USUAL_DEVIATION * (direct.mean + color.mean);
-        let other = color.variance.max(usual * usual);
-        let cells = (variance / (other * CELL).max(f32::MIN_POSITIVE)).sqrt();
-        (cells.sqrt().round() as u32).clamp(1, LARGEST_GRID)
-    }
-
-    /// Luminance of a colour at a pixel, over its samples.
-    fn luminance(&self, record: Record, index: usize) -> Luminance {
-        let plane = &self.planes[record as usize];
-        let Some(values) = plane.get(6 * index..6 * index + 6) else { return Luminance { mean: 0.0, variance: 0.0 } };
-        let [mean, deviations] = [0, 3].map(|first| luminance(Rgb::from_slice(&values[first..first + 3])));
-        Luminance { mean, variance: deviations / self.count(index).max(1) as f32 }
     }
 
     /// Adds the samples of a tile at the same place as if they had been taken after those here.

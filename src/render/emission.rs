@@ -3,7 +3,6 @@
 use super::paths::Packet;
 use super::vertices::Vertices;
 use crate::math::Rgb;
-use crate::math::vec2;
 use crate::scene::Scene;
 use crate::scene::emitter::{EnvmapHits, LightPoint};
 
@@ -28,22 +27,19 @@ pub fn emitter_hit(
     (hit, envmap): (bool, Option<&EnvmapHits>),
 ) -> Option<EmitterHit> {
     let direction = packet.rays.direction.get(lane);
-    let envmap = envmap.filter(|_| !hit);
-    let (mut point, looked_up) = match envmap {
-        Some(envmap) => (scene.far_point(direction)?, Some((envmap.radiance.get(lane), envmap.pdf.0[lane]))),
-        None if hit => (scene.light_point_of(&vertices.surfaces, lane)?, None),
-        None => (scene.environment(direction)?, None),
+    let (point, radiance, density) = match envmap.filter(|_| !hit) {
+        Some(envmap) => (envmap.point(direction, lane), envmap.radiance.get(lane), envmap.pdf.0[lane]),
+        None => {
+            let point =
+                if hit { scene.light_point_of(&vertices.surfaces, lane) } else { scene.environment(direction) }?;
+            let density = scene.emitter_pdf(packet.from.get(lane), &point);
+            (point, scene.radiance(&point, -direction), density)
+        }
     };
-    if let Some(envmap) = envmap {
-        point.at.uv = vec2(envmap.uv[0].0[lane], envmap.uv[1].0[lane]);
-    }
-    let radiance = looked_up.map_or_else(|| scene.radiance(&point, -direction), |(radiance, _)| radiance);
     if radiance == Rgb::ZERO {
         return None;
     }
-    let smooth = packet.smooth.get(lane);
-    let density = || looked_up.map_or_else(|| scene.emitter_pdf(packet.from.get(lane), &point), |(_, pdf)| pdf);
-    let light_pdf = if smooth { density() } else { 0.0 };
+    let light_pdf = if packet.smooth.get(lane) { density } else { 0.0 };
     // Power heuristic with exponent two.
     let ratio = light_pdf / packet.pdf.0[lane];
     let color = packet.throughput.get(lane) * radiance / (1.0 + ratio * ratio);

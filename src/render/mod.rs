@@ -29,8 +29,7 @@ pub use self::schedule::{
     Budget, CheckpointSink, Control, RenderOutcome, RenderSettings, render, render_to_counts, resume, sample,
 };
 
-/// One sample of one pixel, the same whenever and wherever it is asked for, but for directly seen light that is
-/// [refined](seen).
+/// One sample of one pixel, the same whenever and wherever it is asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SampleId {
     /// The render's seed.

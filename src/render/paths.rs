@@ -96,9 +96,17 @@ impl Order {
         for (lane, &index) in indices.enumerate() {
             let (from, at) = (index as usize / LANES, index as usize % LANES);
             to.0.copy(lane, &paths.packets[from], at);
-            to.1.copy(lane, &self.hits[from], at);
+            copy_hit(&mut to.1, lane, &self.hits[from], at);
         }
     }
+}
+
+/// Copies one lane of other hits.
+#[inline(always)]
+fn copy_hit(hits: &mut Hits, to: usize, from: &Hits, lane: usize) {
+    (hits.t[to], hits.u[to], hits.v[to]) = (from.t[lane], from.u[lane], from.v[lane]);
+    hits.geometry[to] = from.geometry[lane];
+    (hits.primitive[to], hits.instance[to]) = (from.primitive[lane], from.instance[lane]);
 }
 
 /// Any number of paths.

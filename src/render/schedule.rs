@@ -8,6 +8,7 @@ use rayon::prelude::*;
 
 use super::SampleId;
 use super::gradient::Shift;
+use super::seen::{self, Grids};
 use super::wave::Wave;
 use crate::film::{Film, Needs, Rejected, Sample, TILE, Tile};
 use crate::scene::Scene;
@@ -106,6 +107,7 @@ pub fn render(scene: &Scene, settings: RenderSettings, control: &Control) -> Ren
 /// have the same bits as without the interruption.
 pub fn resume(scene: &Scene, settings: RenderSettings, control: &Control, mut outcome: RenderOutcome) -> RenderOutcome {
     outcome.stopped = false;
+    let grids = Grids::new(outcome.film.tiles_mut().len());
     while let (false, Some(round)) = (outcome.stopped, next_round(settings.budget, outcome.spp, outcome.elapsed)) {
         let (done, elapsed, start) = (outcome.spp, outcome.elapsed, Instant::now());
         let progress = |share: f32| match settings.budget {
@@ -115,7 +117,7 @@ pub fn resume(scene: &Scene, settings: RenderSettings, control: &Control, mut ou
             }
         };
         let control = Control { progress: &progress, ..*control };
-        run_round(scene, settings, &control, &mut outcome, &|_, _| done + round);
+        run_round((scene, &grids), settings, &control, &mut outcome, &|_, _| done + round);
     }
     if let Some(sink) = control.sink {
         sink.save(&outcome);
@@ -131,8 +133,8 @@ pub fn render_to_counts(
     outcome: &mut RenderOutcome,
     goals: &[u32],
 ) {
-    let width = outcome.film.width;
-    run_round(scene, settings, control, outcome, &|x, y| goals[y * width + x]);
+    let (width, grids) = (outcome.film.width, Grids::new(outcome.film.tiles_mut().len()));
+    run_round((scene, &grids), settings, control, outcome, &|x, y| goals[y * width + x]);
 }
 
 /// Samples per pixel of the next round, none when the budget is used up. A time budget is met by the rounds' own
@@ -154,7 +156,13 @@ fn next_round(budget: Budget, done: u32, elapsed: Duration) -> Option<u32> {
 type Goals<'a> = &'a (dyn Fn(usize, usize) -> u32 + Sync);
 
 /// Renders a round, with pauses for checkpoints.
-fn run_round(scene: &Scene, settings: RenderSettings, control: &Control, outcome: &mut RenderOutcome, goals: Goals) {
+fn run_round(
+    scene: (&Scene, &Grids),
+    settings: RenderSettings,
+    control: &Control,
+    outcome: &mut RenderOutcome,
+    goals: Goals,
+) {
     let (before, start) = (outcome.elapsed, Instant::now());
     let mut paused = true;
     while paused {
@@ -171,7 +179,7 @@ fn run_round(scene: &Scene, settings: RenderSettings, control: &Control, outcome
 /// Renders tiles up to their goals, until a checkpoint is due, which returns true. `control.progress` is called with the
 /// share of finished tiles.
 fn run_tiles(
-    scene: &Scene,
+    (scene, grids): (&Scene, &Grids),
     settings: RenderSettings,
     control: &Control,
     outcome: &mut RenderOutcome,
@@ -182,12 +190,13 @@ fn run_tiles(
     let tiles = outcome.film.tiles_mut();
     let (total, done) = (tiles.len(), Mutex::new(0));
     let wave_of = || Wave::new(scene, settings.needs, settings.shift);
-    tiles.par_iter_mut().for_each_init(wave_of, |wave, tile| {
+    tiles.par_iter_mut().enumerate().for_each_init(wave_of, |wave, (number, tile)| {
         if control.stop.load(Ordering::Relaxed) || due.load(Ordering::Relaxed) {
             return;
         }
         let before = tile.samples();
-        if let Some(rejected) = run_tile(settings, wave, tile, (goals, control.stop)) {
+        let grids = |pixels: &[_]| grids.get(number, || seen::grids(scene, pixels));
+        if let Some(rejected) = run_tile(settings, wave, tile, &grids, (goals, control.stop)) {
             let mut first = first_rejected.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
             first.get_or_insert(rejected);
         }
@@ -208,10 +217,11 @@ fn run_tiles(
 const SOON: u32 = 256;
 
 /// Takes the samples that the pixels of a tile lack. Returns the first that was rejected.
-fn run_tile(
+fn run_tile<'a>(
     settings: RenderSettings,
     wave: &mut Wave,
     tile: &mut Tile,
+    grids_of: &dyn Fn(&[(usize, usize)]) -> &'a [u32],
     (goals, stop): (Goals, &AtomicBool),
 ) -> Option<(SampleId, Rejected)> {
     let mut first_rejected = None;
@@ -226,6 +236,11 @@ fn run_tile(
     let (start, end) = (due().map(|span| span.start).min(), due().map(|span| span.end).max());
     let (mut numbers, mut pixels, mut grids) = (Vec::new(), Vec::new(), Vec::new());
     let start = start.unwrap_or(0);
+    if end.is_none() {
+        return None;
+    }
+    pixels.extend((0..spans.len()).map(|pixel| tile.pixel(pixel)));
+    let all_grids = grids_of(&pixels);
     for index in start..end.unwrap_or(0) {
         if index - start >= SOON && stop.load(Ordering::Relaxed) {
             break;
@@ -235,9 +250,7 @@ fn run_tile(
         pixels.clear();
         pixels.extend(numbers.iter().map(|&pixel| tile.pixel(pixel)));
         grids.clear();
-        if tile.sees_emitters() {
-            grids.extend(numbers.iter().map(|&pixel| tile.direct_grid(pixel)));
-        }
+        grids.extend(numbers.iter().filter_map(|&pixel| all_grids.get(pixel).copied()));
         let samples = wave.trace(settings.seed, settings.first + index, &pixels, &grids);
         for ((&pixel, &(x, y)), sample) in numbers.iter().zip(&pixels).zip(samples) {
             if let Err(reason) = tile.add(pixel, sample) {
@@ -254,7 +267,8 @@ pub fn sample(scene: &Scene, id: SampleId, shift: Shift) -> Sample {
     let (x, y) = (id.x / TILE * TILE, id.y / TILE * TILE);
     let (width, height) = (TILE.min(scene.sensor().width - x), TILE.min(scene.sensor().height - y));
     let pixels: Vec<_> = (0..width * height).map(|pixel| (x + pixel % width, y + pixel / width)).collect();
-    Wave::new(scene, Needs::ALL, shift).trace(id.seed, id.index, &pixels, &[])[(id.y - y) * width + id.x - x]
+    let grids = seen::grids(scene, &pixels);
+    Wave::new(scene, Needs::ALL, shift).trace(id.seed, id.index, &pixels, &grids)[(id.y - y) * width + id.x - x]
 }
 
 #[cfg(test)]

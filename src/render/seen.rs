@@ -1,23 +1,100 @@
-//! Emitters that the camera sees, by rays of their own where they vary within pixels: at the edges of lamps and windows most
-//! of the error would be theirs, and such rays end at the first surface.
+//! Emitters that the camera sees, by rays of their own where they vary within pixels. At the edges of luminaires and windows
+//! most of the error would be theirs, and such rays end at the first surface.
+
+use std::sync::OnceLock;
 
 use super::camera::CameraSamples;
 use crate::film::Sample;
-use crate::math::Rgb;
 use crate::math::lanes::{Bits, LANES, Lanes, Mask};
+use crate::math::{Rgb, luminance};
 use crate::scene::Scene;
 use crate::scene::packet::Surfaces;
+
+/// Cost of a camera ray, in path samples.
+const COST: f32 = 0.05;
+/// Largest number of cells along a pixel's side.
+const LARGEST_GRID: u32 = 4;
+/// Standard deviation of a path sample that is usual where light is scattered, over its mean.
+const USUAL_DEVIATION: f32 = 0.5;
+/// Cells along a pixel's side that are looked at to decide.
+const PROBES: u32 = 2;
+
+/// The results of [`grids`] for the tiles of a film, found when they are first asked for.
+pub struct Grids(Vec<OnceLock<Vec<u32>>>);
+
+impl Grids {
+    /// Results of a number of tiles, none of them known.
+    pub fn new(tiles: usize) -> Self {
+        Self((0..tiles).map(|_| OnceLock::new()).collect())
+    }
+
+    /// The result of one tile; `find` finds it.
+    pub fn get(&self, tile: usize, find: impl FnOnce() -> Vec<u32>) -> &[u32] {
+        self.0[tile].get_or_init(find)
+    }
+}
+
+/// A cell of a pixel: the pixel's position in the list, the number of cells along its side, the cell's own number.
+type Cell = (usize, u32, u32);
+
+/// Cells along the side of every pixel of a list over which samples of directly seen light had best be averaged; empty for
+/// ones. It depends on the scene alone, so that samples stay the same in whatever order they are taken.
+///
+/// With n cells of a cost c in path samples the error for the time, (V_d / n + V) (1 + n c) by the variances of directly seen
+/// light and of everything else, is least at n = √(V_d / (V c)).
+pub fn grids(scene: &Scene, pixels: &[(usize, usize)]) -> Vec<u32> {
+    let shown = scene.has_environment() || scene.shapes().iter().any(|shape| shape.emitter.is_some());
+    if !shown || scene.integrator().hide_emitters {
+        return Vec::new();
+    }
+    let camera = CameraSamples::new(scene, 0, 0, pixels);
+    let per_pixel = PROBES * PROBES;
+    let cells: Vec<Cell> =
+        (0..pixels.len()).flat_map(|pixel| (0..per_pixel).map(move |cell| (pixel, PROBES, cell))).collect();
+    let mut moments = vec![[0.0f32; 2]; pixels.len()];
+    let mut surfaces = Surfaces::default();
+    look(scene, &camera, &cells, &mut surfaces, |(pixel, ..), radiance| {
+        let value = luminance(radiance);
+        moments[pixel][0] += value / per_pixel as f32;
+        moments[pixel][1] += value * value / per_pixel as f32;
+    });
+    let grid = |pixel: usize| {
+        let [mean, square] = moments[pixel];
+        let (x, y) = pixels[pixel];
+        let near = |other: usize| pixels[other].0.abs_diff(x) <= 1 && pixels[other].1.abs_diff(y) <= 1;
+        let steps = (0..pixels.len()).filter(|&other| near(other)).map(|other| (moments[other][0] - mean).abs());
+        let step = steps.fold(0.0, f32::max);
+        // An edge between two pixels may pass through this one: a twentieth of its area on the other side, say.
+        let variance = (square - mean * mean).max(0.05 * step * step);
+        let usual = (USUAL_DEVIATION * mean.max(0.05 * step)).powi(2);
+        let best = (variance / (usual * COST).max(f32::MIN_POSITIVE)).sqrt();
+        (best.sqrt().round() as u32).clamp(1, LARGEST_GRID)
+    };
+    if moments.iter().all(|&[mean, _]| mean == 0.0) {
+        return Vec::new();
+    }
+    (0..pixels.len()).map(grid).collect()
+}
 
 /// Replaces the directly seen light of samples by the mean over a grid of cells, with a ray through each. `grids` has the
 /// number of cells along a side for every sample; one leaves it as it is.
 pub fn refine(scene: &Scene, camera: &CameraSamples, grids: &[u32], samples: &mut [Sample], surfaces: &mut Surfaces) {
     let refined = grids.iter().enumerate().filter(|&(_, &side)| side > 1);
-    let cells: Vec<_> = refined.flat_map(|(i, &side)| (0..side * side).map(move |cell| (i, side, cell))).collect();
-    for &(i, _, cell) in &cells {
-        if cell == 0 {
-            samples[i].direct = Rgb::ZERO;
-        }
-    }
+    let cells: Vec<Cell> = refined.flat_map(|(i, &side)| (0..side * side).map(move |cell| (i, side, cell))).collect();
+    cells.iter().for_each(|&(i, ..)| samples[i].direct = Rgb::ZERO);
+    look(scene, camera, &cells, surfaces, |(i, side, _), radiance| {
+        samples[i].direct += radiance / (side * side) as f32;
+    });
+}
+
+/// Traces a camera ray through a point of every cell; `see` takes the emitted radiance at its end.
+fn look(
+    scene: &Scene,
+    camera: &CameraSamples,
+    cells: &[Cell],
+    surfaces: &mut Surfaces,
+    mut see: impl FnMut(Cell, Rgb),
+) {
     for packet in cells.chunks(LANES) {
         let (mut hashes, mut numbers) = (Bits::ZERO, Bits::ZERO);
         for (lane, &(i, _, cell)) in packet.iter().enumerate() {
@@ -37,8 +114,6 @@ pub fn refine(scene: &Scene, camera: &CameraSamples, grids: &[u32], samples: &mu
             scene.pass_emitters(&rays, &mut hit, surfaces);
         }
         let radiance = scene.seen_radiance(&rays, surfaces, (active, hit));
-        for (lane, &(i, side, _)) in packet.iter().enumerate() {
-            samples[i].direct += radiance.get(lane) / (side * side) as f32;
-        }
+        packet.iter().enumerate().for_each(|(lane, &cell)| see(cell, radiance.get(lane)));
     }
 }

@@ -76,7 +76,7 @@ impl<'a> PathTracer<'a> {
         let hits = paths.packets().map(|(packet, active)| scene.hits_of_packet(&packet.rays, active, depth == 0));
         order.hits.extend(hits);
         let sorted = depth > 0 && order.sort(paths.len(), KINDS, |hits, lane| scene.kind_of_hit(hits, lane));
-        let mut gathered = (Packet::EMPTY, Hits::NONE);
+        let mut gathered = (Packet::EMPTY, order.hits[0]);
         for (k, (packet, active)) in paths.packets().enumerate() {
             let vertices = &mut level[k];
             let (packet, hits) = if sorted {

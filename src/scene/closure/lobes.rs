@@ -95,14 +95,31 @@ where
     }
 }
 
+// Functions of their own for the single closures of a kind: all kinds inlined into one function take minutes to compile.
+
+#[inline(never)]
+fn eval<L: Lobes<1>>(lobes: &L, wi: Lanes3<1>, wo: Lanes3<1>) -> Evals<1> {
+    lobes.eval(wi, wo)
+}
+
+#[inline(never)]
+fn propose<L: Lobes<1>>(lobes: &L, wi: Lanes3<1>, numbers: &Numbers<1>) -> Proposals<1> {
+    lobes.propose(wi, numbers)
+}
+
+#[inline(never)]
+fn delta_of<L: Lobes<1>>(lobes: &L, wi: Lanes3<1>, lobe: Lobe) -> Deltas<1> {
+    lobes.delta(wi, lobe)
+}
+
 impl AllLobes<1> for Closure {
     fn eval_lobes(&self, [wi, wo]: [Lanes3<1>; 2], active: Mask<1>) -> Evals<1> {
-        each_kind!(self, active, |Each, _lanes| return Each::load(self).eval(wi, wo));
+        each_kind!(self, active, |Each, _lanes| return eval(&Each::load(self), wi, wo));
         Evals::ZERO
     }
 
     fn propose_lobes(&self, wi: Lanes3<1>, numbers: &Numbers<1>, active: Mask<1>) -> Proposals<1> {
-        each_kind!(self, active, |Each, _lanes| return Each::load(self).propose(wi, numbers));
+        each_kind!(self, active, |Each, _lanes| return propose(&Each::load(self), wi, numbers));
         (Scatters::default(), Mask::NONE)
     }
 
@@ -144,6 +161,6 @@ pub fn visible_facets(facets: &Facets, wi: Lanes3, u: [Lanes; 2]) -> Lanes3 {
 
 /// [`Lobes::delta`] of a single closure.
 pub fn delta(closure: &Closure, wi: Lanes3<1>, lobe: Lobe) -> Deltas<1> {
-    each_kind!(closure, Mask([!0]), |Each, _lanes| return Each::load(closure).delta(wi, lobe));
+    each_kind!(closure, Mask([!0]), |Each, _lanes| return delta_of(&Each::load(closure), wi, lobe));
     Deltas::NONE
 }

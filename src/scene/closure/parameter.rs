@@ -81,7 +81,7 @@ impl<const N: usize> Parameter<N> for Transmittance<N> {
     }
 }
 
-/// A struct of parameters that closures of a kind have.
+/// A struct of parameters that closures of a kind have, and the functions for packets of its lobes.
 macro_rules! parameters {
     ($(#[$about:meta])* $kind:ident { $($(#[$field_about:meta])* $field:ident: $type:ident,)* }) => {
         $(#[$about])*
@@ -90,77 +90,65 @@ macro_rules! parameters {
             $($(#[$field_about])* pub $field: $type<N>,)*
         }
 
-        impl<const N: usize> $kind<N> {
-            /// The parameters of closures, as far as these are of the kind.
-            #[inline(always)]
-            pub(super) fn load(closures: &$crate::scene::closure::Closures<N>) -> Self {
-                let mut left = &closures.parameters[..];
-                $(
-                    let $field = <$type<N> as $crate::scene::closure::parameter::Parameter<N>>::load(left);
-                    left = &left[<$type<N> as $crate::scene::closure::parameter::Parameter<N>>::SLOTS..];
-                )*
-                let _ = left;
-                Self { $($field,)* }
-            }
-        }
+        const _: () = {
+            use $crate::math::lanes::{LANES, Lanes, Lanes3};
+            use $crate::scene::closure::lobes::{Lobes, OfPackets};
+            use $crate::scene::closure::parameter::Parameter;
+            use $crate::scene::closure::{Closure, Closures, Evals, Kind, Numbers, PARAMETERS, Proposals};
 
-        impl $crate::scene::closure::lobes::OfPackets for $kind<{ $crate::math::lanes::LANES }> {
-            fn eval_packet(
-                closures: &$crate::scene::closure::Closures,
-                [wi, wo]: [$crate::math::lanes::Lanes3; 2],
-            ) -> $crate::scene::closure::Evals {
-                #[cfg_attr(
-                    not(baseline),
-                    multiversion::multiversion(targets(
-                        "x86_64+avx512f+avx512bw+avx512dq+avx512vl",
-                        "x86_64+avx2+fma"
-                    ))
-                )]
-                fn eval(
-                    closures: &$crate::scene::closure::Closures,
-                    [wi, wo]: [$crate::math::lanes::Lanes3; 2],
-                ) -> $crate::scene::closure::Evals {
-                    $crate::scene::closure::lobes::Lobes::eval(&$kind::load(closures), wi, wo)
+            impl<const N: usize> $kind<N> {
+                /// The parameters of closures, as far as these are of the kind.
+                #[inline(always)]
+                pub(super) fn load(closures: &Closures<N>) -> Self {
+                    let left = &closures.parameters[..];
+                    $(
+                        let $field = <$type<N> as Parameter<N>>::load(left);
+                        let left = &left[<$type<N> as Parameter<N>>::SLOTS..];
+                    )*
+                    let _ = left;
+                    Self { $($field,)* }
                 }
-                eval(closures, [wi, wo])
             }
 
-            fn propose_packet(
-                closures: &$crate::scene::closure::Closures,
-                wi: $crate::math::lanes::Lanes3,
-                numbers: &$crate::scene::closure::Numbers,
-            ) -> $crate::scene::closure::Proposals {
-                #[cfg_attr(
-                    not(baseline),
-                    multiversion::multiversion(targets(
-                        "x86_64+avx512f+avx512bw+avx512dq+avx512vl",
-                        "x86_64+avx2+fma"
-                    ))
-                )]
-                fn propose(
-                    closures: &$crate::scene::closure::Closures,
-                    wi: $crate::math::lanes::Lanes3,
-                    numbers: &$crate::scene::closure::Numbers,
-                ) -> $crate::scene::closure::Proposals {
-                    $crate::scene::closure::lobes::Lobes::propose(&$kind::load(closures), wi, numbers)
+            impl $kind {
+                /// A closure with these parameters. `roughness`: the smallest one of its smooth lobes, infinite for
+                /// diffuse ones; `None` without smooth lobes.
+                pub fn closure(&self, roughness: Option<f32>) -> Closure {
+                    let (mut parameters, mut count) = ([Lanes::ZERO; PARAMETERS], 0);
+                    $(
+                        Parameter::store(&self.$field, &mut parameters[count..]);
+                        count += <$type<1> as Parameter<1>>::SLOTS;
+                    )*
+                    Closure::new(Kind::$kind, &parameters[..count], roughness)
                 }
-                propose(closures, wi, numbers)
             }
-        }
 
-        impl $kind {
-            /// A closure with these parameters. `roughness`: the smallest one of its smooth lobes, infinite for diffuse
-            /// ones; `None` without smooth lobes.
-            pub fn closure(&self, roughness: Option<f32>) -> $crate::scene::closure::Closure {
-                let mut parameters = [Lanes::ZERO; $crate::scene::closure::PARAMETERS];
-                let mut first = 0;
-                $(
-                    $crate::scene::closure::parameter::Parameter::store(&self.$field, &mut parameters[first..]);
-                    first += <$type<1> as $crate::scene::closure::parameter::Parameter<1>>::SLOTS;
-                )*
-                $crate::scene::closure::Closure::new($crate::scene::closure::Kind::$kind, &parameters[..first], roughness)
+            impl OfPackets for $kind<LANES> {
+                fn eval_packet(closures: &Closures, directions: [Lanes3; 2]) -> Evals {
+                    eval(closures, directions)
+                }
+
+                fn propose_packet(closures: &Closures, wi: Lanes3, numbers: &Numbers) -> Proposals {
+                    propose(closures, wi, numbers)
+                }
             }
-        }
+
+            #[cfg_attr(
+                not(baseline),
+                multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))
+            )]
+            fn eval(closures: &Closures, [wi, wo]: [Lanes3; 2]) -> Evals {
+                $kind::load(closures).eval(wi, wo)
+            }
+
+            #[cfg_attr(
+                not(baseline),
+                multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))
+            )]
+            fn propose(closures: &Closures, wi: Lanes3, numbers: &Numbers) -> Proposals {
+                $kind::load(closures).propose(wi, numbers)
+            }
+        };
     };
 }
 pub(super) use parameters;

@@ -65,6 +65,8 @@ pub struct EnvmapSample {
 
 /// Sixteen rays that end on an environment image.
 pub struct EnvmapHits {
+    /// The emitter's index.
+    pub emitter: u32,
     /// Texture coordinates.
     pub uv: [Lanes; 2],
     /// Densities per solid angle of [`Emitter::sample`].
@@ -73,8 +75,17 @@ pub struct EnvmapHits {
     pub radiance: Lanes3,
 }
 
+impl EnvmapHits {
+    /// The end of one ray.
+    pub fn point(&self, direction: Vec3, lane: usize) -> LightPoint {
+        let uv = vec2(self.uv[0].0[lane], self.uv[1].0[lane]);
+        LightPoint { emitter: self.emitter, ..far(direction, uv) }
+    }
+}
+
 impl EnvMap {
-    /// The image along the directions of the active lanes, as [`Emitter::environment_point`].
+    /// The image along the directions of the active lanes, as [`Emitter::environment_point`]. The scene sets the
+    /// emitter index and the chance of choosing it.
     #[inline(always)]
     pub fn hits(&self, directions: Lanes3, active: Mask) -> EnvmapHits {
         let uv = self.uv(directions);
@@ -84,7 +95,7 @@ impl EnvMap {
             pdf.0[lane] = self.partition.as_ref().map_or(0.0, |partition| partition.pdf(at));
             radiance.set(lane, self.look_up(at));
         }
-        EnvmapHits { uv, pdf: per_solid_angle(pdf, uv[1]), radiance }
+        EnvmapHits { emitter: 0, uv, pdf: per_solid_angle(pdf, uv[1]), radiance }
     }
 
     /// [`Emitter::sample`] with density and radiance, for the active ones.

@@ -261,8 +261,10 @@ impl Scene {
     /// The environment image along active rays that have hit nothing, with the density with which [`Scene::sample_lights`]
     /// finds its points; `None` if the environment is no image.
     pub fn envmap_hits(&self, rays: &Rays, active: Mask) -> Option<EnvmapHits> {
-        let index = self.envmap.filter(|_| active.any())? as usize;
+        let emitter = self.envmap.filter(|_| active.any())?;
+        let index = emitter as usize;
         let mut hits = envmap_hits(self.emitters[index].envmap()?, rays, active);
+        hits.emitter = emitter;
         // Emitters at infinity are chosen with the same chance everywhere.
         let chance = self.emitter_choice.as_ref().map_or(0.0, |choice| choice.probability(Vec3::ZERO, index));
         hits.pdf = hits.pdf * Lanes::splat(chance);
