@@ -69,7 +69,7 @@ fn samples_go_where_errors_are() {
     // Shadows and reflections of a lamp's edge are harder than a wall.
     let scene = bundled("cornell-box", (48, 48));
     for allocator in &ALLOCATORS[..2] {
-        let outcome = run(&scene, "apr", *allocator, spp(32)).unwrap();
+        let outcome = run(&scene, "frgr", *allocator, spp(32)).unwrap();
         let uniform = film(&scene, 512, 9, Needs::default()).develop();
         let (color, variance) = (uniform.get(Layer::Color).unwrap(), uniform.get(Layer::ColorVariance).unwrap());
         let hardness = |i: usize| variance.data[3 * i + 1] / (color.data[3 * i + 1].powi(2) + 0.01);
