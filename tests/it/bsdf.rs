@@ -276,11 +276,11 @@ fn direction(i: u64, k: u64) -> Vec3 {
 /// here holds for both.
 #[test]
 fn packets_scatter_as_single_surfaces_do() {
+    // Kept from case to case, as packets are from wave to wave: nothing of another material may show.
+    let (mut surfaces, mut materials, mut scatters) = (Surfaces::default(), Materials::default(), Scatters::default());
     for (name, xml) in CASES {
         let (scene, surface) = surface(xml, Vec3::Z);
         let bsdf = scene.bsdf(&surface);
-        let (mut surfaces, mut materials, mut scatters) =
-            (Surfaces::default(), Materials::default(), Scatters::default());
         for packet in 0..200u64 {
             let number = |lane: usize| packet * LANES as u64 + lane as u64;
             let single: Vec<_> = (0..LANES).map(|i| Surface { wi: direction(number(i), 11), ..surface }).collect();

@@ -146,7 +146,7 @@ pub type Whole<'a> = &'a dyn Fn() -> Surface;
 /// Scattering at a surface. A material says either what its closure is or, if it has none, how it scatters.
 pub trait Bsdf: Send + Sync {
     /// The material at a surface, if it is one of the [kinds](crate::scene::closure::Kind) that packets evaluate. It has one
-    /// everywhere or nowhere.
+    /// everywhere or nowhere; where one is missing all the same, the material is asked as if it had none.
     fn closure(&self, _at: &Point, _surface: Whole) -> Option<Closure> {
         None
     }

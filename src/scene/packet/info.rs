@@ -36,7 +36,7 @@ impl ShapeInfo {
         let constant = bsdf.textures().iter().all(|texture| texture.constant().is_some());
         let closes = closure.is_some();
         let kind = closure.map_or(Kind::None, |closure| closure.kind());
-        let diffuse = closure.is_some_and(|closure| closure.plainly_diffuse().any());
+        let diffuse = closure.is_some_and(|closure| closure.plainly_diffuse().any()) && !bsdf.transmits();
         let closure = closure.filter(|_| constant);
         Self { emitter: *emitter, closes, kind, diffuse, mesh, uv: closure.is_none() || emitter.is_some(), closure }
     }

@@ -62,7 +62,7 @@ impl Materials {
         if !(active & !self.closures.plainly_diffuse()).any() {
             return self.closures.eval_diffuse(wi, wo, active);
         }
-        let mut evals = eval(&self.closures, (wi, wo), active);
+        let mut evals = eval(&self.closures, (wi, wo), active & self.closures.exist());
         for lane in (active & !self.closures.exist()).lanes() {
             let surface = surfaces.get(lane);
             evals.set(lane, scene.bsdf(&surface).eval(&surface, wi.get(lane), wo.get(lane)));
@@ -85,7 +85,7 @@ impl Materials {
             (*to, found) = self.closures.sample_diffuse(surfaces.wi, [u, v], active);
             return found;
         }
-        (*to, found) = sample(&self.closures, surfaces.wi, (lobe, [u, v]), active);
+        (*to, found) = sample(&self.closures, surfaces.wi, (lobe, [u, v]), active & self.closures.exist());
         for lane in (active & !self.closures.exist()).lanes() {
             let surface = surfaces.get(lane);
             let numbers = vec2(u.0[lane], v.0[lane]);
