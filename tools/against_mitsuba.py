@@ -4,12 +4,13 @@
     python tools/against_mitsuba.py gradients [SPP=128]
     python tools/against_mitsuba.py correlation SCENES REFERENCES [SPP=64]
     python tools/against_mitsuba.py speed SCENES [SPP=8]
+    python tools/against_mitsuba.py efficiency SCENES REFERENCES [SPP=32]
     python tools/against_mitsuba.py bundled [SPP=1024]
     python tools/against_mitsuba.py loading SCENES [NAME ...]
 
 SCENES is a folder with NAME/scene.xml; REFERENCES one with NAME.exr (mean) and NAME_var.exr (variance of the mean),
 box filtered. Run from the repository's top folder after `cargo build --release`. Needs PyPI openimageio and numpy, and
-mitsuba for `speed`, `bundled` and `loading` (with DRJIT_LIBLLVM_PATH naming libLLVM for the LLVM variant).
+mitsuba for `speed`, `efficiency`, `bundled` and `loading` (with DRJIT_LIBLLVM_PATH naming libLLVM for the LLVM variant).
 """
 import argparse
 import json
@@ -149,9 +150,11 @@ def correlation(scenes, references, spp="64"):
         print("| %s | %.4g | %.4g | %.3f | %.2g |" % (name, *error, error[1] / error[0], floor), flush=True)
 
 
-def mitsuba_scene(mi, path, size):
-    """The scene with a box filter at another size."""
+def mitsuba_scene(mi, path, size, sampler=None):
+    """The scene with a box filter at another size, and with another sampler where one is named."""
     tree = ET.parse(path)
+    for element in tree.getroot().iter("sampler") if sampler else ():
+        element.set("type", sampler)
     for film in tree.getroot().iter("film"):
         for old in film.findall("rfilter"):
             film.remove(old)
@@ -206,6 +209,38 @@ def speed(scenes, spp="8"):
             m["path"] / m["scalar_rgb"], m["path"] / m["llvm_ad_rgb"]), flush=True)
 
 
+def efficiency(scenes, references, spp="32"):
+    """Error of path tracing for the time: relMSE without the references' noise, times seconds; means of three seeds."""
+    import mitsuba as mi
+    mi.set_variant("llvm_ad_rgb")
+    samplers = ("independent", "multijitter", "ldsampler")
+    print("| scene | Fluxion | %s | Fluxion / best |" % " | ".join(samplers))
+    print("|---" * (len(samplers) + 3) + "|")
+    for name in ("cornell-box", "kitchen", "veach-ajar", "living-room", "classroom"):
+        path, reference = (os.path.join(folder, name) for folder in (scenes, references))
+        path = os.path.join(path, "scene.xml")
+        expected, noise = (rgb(exr.everything(reference + end + ".exr")) for end in ("", "_var"))
+        size = expected.shape[1::-1]
+        products = {kind: [] for kind in ("fluxion", *samplers)}
+        loaded = {sampler: mitsuba_scene(mi, path, size, sampler) for sampler in samplers}
+        for scene in loaded.values():
+            np.array(mi.render(scene, spp=int(spp), seed=0))
+        for seed in range(1, 4):
+            image, _, record = fluxion(path, size, int(spp), "primal", seed=seed)
+            renders = [("fluxion", image, record["seconds"]["render"])]
+            for sampler, scene in loaded.items():
+                start = time.time()
+                image = np.array(mi.render(scene, spp=int(spp), seed=seed), dtype=np.float64)[..., :3]
+                renders.append((sampler, image, time.time() - start))
+            for kind, image, seconds in renders:
+                error = (((image - expected) ** 2 - noise) / (expected ** 2 + 0.01)).mean()
+                products[kind].append(error * seconds)
+        mean = {kind: statistics.mean(values) for kind, values in products.items()}
+        best = min(mean[sampler] for sampler in samplers)
+        print("| %s | %s | %.2f |" % (name, " | ".join("%.4g" % value for value in mean.values()), mean["fluxion"] / best),
+              flush=True)
+
+
 def bundled(spp="1024"):
     """Our own scenes, rendered by both."""
     print("| scene | mean ratio R G B | standard error | z rms | beyond 4 |\n|---|---|---|---|---|")
@@ -252,7 +287,8 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     commands = parser.add_subparsers(dest="command", required=True)
     for table, folders, spp in ((radiance, ("scenes", "references"), 512), (gradients, (), 128),
-                                (correlation, ("scenes", "references"), 64), (speed, ("scenes",), 8), (bundled, (), 1024)):
+                                (correlation, ("scenes", "references"), 64), (speed, ("scenes",), 8),
+                                (efficiency, ("scenes", "references"), 32), (bundled, (), 1024)):
         command = commands.add_parser(table.__name__, help=table.__doc__)
         for folder in folders:
             command.add_argument(folder)

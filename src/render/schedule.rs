@@ -195,8 +195,7 @@ fn run_tiles(
             return;
         }
         let before = tile.samples();
-        let grids = |pixels: &[_]| grids.get(number, || seen::grids(scene, pixels));
-        if let Some(rejected) = run_tile(settings, wave, tile, &grids, (goals, control.stop)) {
+        if let Some(rejected) = run_tile(settings, wave, (tile, number), grids, (goals, control.stop)) {
             let mut first = first_rejected.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
             first.get_or_insert(rejected);
         }
@@ -217,11 +216,11 @@ fn run_tiles(
 const SOON: u32 = 256;
 
 /// Takes the samples that the pixels of a tile lack. Returns the first that was rejected.
-fn run_tile<'a>(
+fn run_tile(
     settings: RenderSettings,
     wave: &mut Wave,
-    tile: &mut Tile,
-    grids_of: &dyn Fn(&[(usize, usize)]) -> &'a [u32],
+    (tile, number): (&mut Tile, usize),
+    grids: &Grids,
     (goals, stop): (Goals, &AtomicBool),
 ) -> Option<(SampleId, Rejected)> {
     let mut first_rejected = None;
@@ -233,25 +232,21 @@ fn run_tile<'a>(
         })
         .collect();
     let due = || spans.iter().filter(|span| !span.is_empty());
-    let (start, end) = (due().map(|span| span.start).min(), due().map(|span| span.end).max());
-    let (mut numbers, mut pixels, mut grids) = (Vec::new(), Vec::new(), Vec::new());
-    let start = start.unwrap_or(0);
-    if end.is_none() {
-        return None;
-    }
-    pixels.extend((0..spans.len()).map(|pixel| tile.pixel(pixel)));
-    let all_grids = grids_of(&pixels);
-    for index in start..end.unwrap_or(0) {
+    let (start, end) = (due().map(|span| span.start).min()?, due().map(|span| span.end).max()?);
+    let all: Vec<_> = (0..spans.len()).map(|pixel| tile.pixel(pixel)).collect();
+    let all_cells = grids.get(number, || seen::grids(wave.scene(), &all));
+    let (mut numbers, mut pixels, mut cells) = (Vec::new(), Vec::new(), Vec::new());
+    for index in start..end {
         if index - start >= SOON && stop.load(Ordering::Relaxed) {
             break;
         }
         numbers.clear();
         numbers.extend((0..spans.len()).filter(|&pixel| spans[pixel].contains(&index)));
         pixels.clear();
-        pixels.extend(numbers.iter().map(|&pixel| tile.pixel(pixel)));
-        grids.clear();
-        grids.extend(numbers.iter().filter_map(|&pixel| all_grids.get(pixel).copied()));
-        let samples = wave.trace(settings.seed, settings.first + index, &pixels, &grids);
+        pixels.extend(numbers.iter().map(|&pixel| all[pixel]));
+        cells.clear();
+        cells.extend(numbers.iter().filter_map(|&pixel| all_cells.get(pixel).copied()));
+        let samples = wave.trace(settings.seed, settings.first + index, &pixels, &cells);
         for ((&pixel, &(x, y)), sample) in numbers.iter().zip(&pixels).zip(samples) {
             if let Err(reason) = tile.add(pixel, sample) {
                 first_rejected

@@ -33,6 +33,11 @@ impl<'a> Wave<'a> {
         }
     }
 
+    /// The scene.
+    pub fn scene(&self) -> &'a Scene {
+        self.tracer.scene
+    }
+
     /// Sample number `index` of some pixels, in their order. `grids`: the number of cells along a pixel's side over which
     /// directly seen light is averaged, for every pixel; empty for single rays.
     pub fn trace(&mut self, seed: u64, index: u32, pixels: &[(usize, usize)], grids: &[u32]) -> &[Sample] {
