@@ -27,19 +27,23 @@ pub fn emitter_hit(
     (hit, envmap): (bool, Option<&EnvmapHits>),
 ) -> Option<EmitterHit> {
     let direction = packet.rays.direction.get(lane);
-    let (point, radiance, density) = match envmap.filter(|_| !hit) {
-        Some(envmap) => (envmap.point(direction, lane), envmap.radiance.get(lane), envmap.pdf.0[lane]),
+    let envmap = envmap.filter(|_| !hit);
+    let (point, radiance) = match envmap {
+        Some(envmap) => (envmap.point(direction, lane), envmap.radiance.get(lane)),
         None => {
             let point =
                 if hit { scene.light_point_of(&vertices.surfaces, lane) } else { scene.environment(direction) }?;
-            let density = scene.emitter_pdf(packet.from.get(lane), &point);
-            (point, scene.radiance(&point, -direction), density)
+            (point, scene.radiance(&point, -direction))
         }
     };
     if radiance == Rgb::ZERO {
         return None;
     }
-    let light_pdf = if packet.smooth.get(lane) { density } else { 0.0 };
+    let light_pdf = match envmap {
+        _ if !packet.smooth.get(lane) => 0.0,
+        Some(envmap) => envmap.pdf.0[lane],
+        None => scene.emitter_pdf(packet.from.get(lane), &point),
+    };
     // Power heuristic with exponent two.
     let ratio = light_pdf / packet.pdf.0[lane];
     let color = packet.throughput.get(lane) * radiance / (1.0 + ratio * ratio);

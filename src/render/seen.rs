@@ -7,8 +7,8 @@ use super::camera::CameraSamples;
 use crate::film::Sample;
 use crate::math::lanes::{Bits, LANES, Lanes, Mask};
 use crate::math::{Rgb, luminance};
-use crate::scene::Scene;
 use crate::scene::packet::Surfaces;
+use crate::scene::{Integrator, Scene};
 
 /// Cost of a camera ray, in path samples.
 const COST: f32 = 0.05;
@@ -37,14 +37,15 @@ impl Grids {
 /// A cell of a pixel: the pixel's position in the list, the number of cells along its side, the cell's own number.
 type Cell = (usize, u32, u32);
 
-/// Cells along the side of every pixel of a list over which samples of directly seen light had best be averaged; empty for
-/// ones. It depends on the scene alone, so that samples stay the same in whatever order they are taken.
+/// Cells along the side of every pixel of a tile, row by row, over which samples of directly seen light had best be averaged;
+/// empty for ones. It depends on the scene alone, so that samples stay the same in whatever order they are taken.
 ///
 /// With n cells of a cost c in path samples the error for the time, (V_d / n + V) (1 + n c) by the variances of directly seen
 /// light and of everything else, is least at n = √(V_d / (V c)).
 pub fn grids(scene: &Scene, pixels: &[(usize, usize)]) -> Vec<u32> {
     let shown = scene.has_environment() || scene.shapes().iter().any(|shape| shape.emitter.is_some());
-    if !shown || scene.integrator().hide_emitters {
+    let Integrator { max_depth, hide_emitters, .. } = scene.integrator();
+    if !shown || hide_emitters || max_depth == 0 {
         return Vec::new();
     }
     let camera = CameraSamples::new(scene, 0, 0, pixels);
@@ -58,12 +59,13 @@ pub fn grids(scene: &Scene, pixels: &[(usize, usize)]) -> Vec<u32> {
         moments[pixel][0] += value / per_pixel as f32;
         moments[pixel][1] += value * value / per_pixel as f32;
     });
+    let width = pixels.iter().take_while(|pixel| pixel.1 == pixels[0].1).count();
+    let height = pixels.len() / width;
     let grid = |pixel: usize| {
         let [mean, square] = moments[pixel];
-        let (x, y) = pixels[pixel];
-        let near = |other: usize| pixels[other].0.abs_diff(x) <= 1 && pixels[other].1.abs_diff(y) <= 1;
-        let steps = (0..pixels.len()).filter(|&other| near(other)).map(|other| (moments[other][0] - mean).abs());
-        let step = steps.fold(0.0, f32::max);
+        let around = |at: usize, size: usize| at.saturating_sub(1)..(at + 2).min(size);
+        let near = around(pixel / width, height).flat_map(|y| around(pixel % width, width).map(move |x| y * width + x));
+        let step = near.map(|other| (moments[other][0] - mean).abs()).fold(0.0, f32::max);
         // An edge between two pixels may pass through this one: a twentieth of its area on the other side, say.
         let variance = (square - mean * mean).max(0.05 * step * step);
         let usual = (USUAL_DEVIATION * mean.max(0.05 * step)).powi(2);

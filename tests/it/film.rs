@@ -111,6 +111,28 @@ fn the_plan_says_what_a_scene_can_do_without() {
     }
 }
 
+/// A luminaire in front of nothing, seen through paths of at most `max_depth` edges: the mean of directly seen light.
+fn seen_light(max_depth: u32, hide: bool) -> f32 {
+    let scene = crate::common::scene(&format!(
+        r#"<integrator type="path"><integer name="max_depth" value="{max_depth}"/>
+        <boolean name="hide_emitters" value="{hide}"/></integrator>{}
+        <shape type="sphere"><float name="radius" value="0.7"/>
+        <emitter type="area"><rgb name="radiance" value="3"/></emitter></shape>"#,
+        sensor("0,0,4", 24, 18)
+    ));
+    let direct = film(&scene, 16, 1, Needs::default()).develop().get(Layer::Direct).unwrap().clone();
+    direct.data.iter().sum::<f32>() / direct.data.len() as f32
+}
+
+#[test]
+fn luminaires_are_seen_by_paths_of_one_edge_and_not_where_they_are_hidden() {
+    // The disk that a ball of radius r shows at distance d, over the film's area at distance one.
+    let (tangent, half_width) = (0.7 / (16.0f32 - 0.49).sqrt(), 20f32.to_radians().tan());
+    let share = std::f32::consts::PI * tangent * tangent / (4.0 * half_width * half_width * 18.0 / 24.0);
+    assert!((seen_light(1, false) / (3.0 * share) - 1.0).abs() < 5e-3, "{} and {}", seen_light(1, false), 3.0 * share);
+    assert_eq!([seen_light(0, false), seen_light(1, true)], [0.0; 2]);
+}
+
 #[test]
 fn what_nobody_needs_is_not_recorded() {
     let scene = bundled("unit/diffuse", (8, 6));

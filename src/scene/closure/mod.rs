@@ -30,7 +30,7 @@ pub use self::scatter::{Deltas, Draws, Evals, Numbers, Proposals, Scatters};
 pub use self::thin::PrincipledThin;
 use super::bsdf::{BsdfSample, Delta, Eval, Lobe};
 use crate::math::lanes::{Bits, LANES, Lanes, Lanes3, Mask};
-use crate::math::{Vec2, Vec3, warp};
+use crate::math::{Rgb, Vec2, Vec3, warp};
 
 /// Kinds of lobes that closures have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -60,20 +60,6 @@ pub enum Kind {
 
 /// Number of [`Kind`]s.
 pub const KINDS: usize = Kind::PrincipledThin as usize + 1;
-
-/// All kinds, by number.
-const ALL_KINDS: [Kind; KINDS] = [
-    Kind::None,
-    Kind::Diffuse,
-    Kind::Conductor,
-    Kind::RoughConductor,
-    Kind::Dielectric,
-    Kind::RoughDielectric,
-    Kind::Plastic,
-    Kind::RoughPlastic,
-    Kind::Principled,
-    Kind::PrincipledThin,
-];
 
 /// Largest number of parameters.
 const PARAMETERS: usize = 18;
@@ -161,9 +147,9 @@ impl Closure {
         Deltas { wo: deltas.wo.mirror(behind), ..deltas }.get(0)
     }
 
-    /// The kind of its lobes.
-    pub fn kind(&self) -> Kind {
-        ALL_KINDS[self.kind.0[0] as usize]
+    /// Number of the [`Kind`] of its lobes.
+    pub fn kind(&self) -> usize {
+        self.kind.0[0] as usize
     }
 
     /// Smallest roughness of the smooth lobes, if there are such.
@@ -221,6 +207,12 @@ impl<const N: usize> Closures<N> {
     #[inline(always)]
     pub fn plainly_diffuse(&self) -> Mask<N> {
         self.are(Kind::Diffuse) & !(self.opacity.less(Lanes::ONE) | self.perturbation.lanes)
+    }
+
+    /// Reflectance of a lane, if its lobes are [`Diffuse`].
+    #[inline(always)]
+    pub fn reflectance(&self, lane: usize) -> Option<Rgb> {
+        self.are(Kind::Diffuse).get(lane).then(|| Diffuse::load(self).reflectance.get(lane))
     }
 
     #[inline(always)]

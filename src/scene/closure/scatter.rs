@@ -166,16 +166,6 @@ impl<const N: usize> Deltas<N> {
     /// None in all lanes.
     pub const NONE: Self = Self { wo: Lanes3::ZERO, value: Lanes3::ZERO, probability: Lanes::ZERO };
 
-    /// Others in some lanes.
-    #[inline(always)]
-    pub fn replaced(self, others: &Self, lanes: Mask<N>) -> Self {
-        Self {
-            wo: lanes.select3(others.wo, self.wo),
-            value: lanes.select3(others.value, self.value),
-            probability: lanes.select(others.probability, self.probability),
-        }
-    }
-
     /// The same on a share of the surface.
     #[inline(always)]
     pub fn scaled(self, share: Lanes<N>) -> Self {

@@ -14,8 +14,8 @@ pub struct ShapeInfo {
     pub emitter: Option<u32>,
     /// Whether the material has a closure.
     pub closes: bool,
-    /// Kind of the closure.
-    pub kind: Kind,
+    /// Number of the kind of closure.
+    pub kind: usize,
     /// Whether that is a diffuse lobe and nothing else.
     pub diffuse: bool,
     /// The closure, if it is the same everywhere.
@@ -35,7 +35,7 @@ impl ShapeInfo {
         let closure = bsdf.closure(&surface.at, &|| surface);
         let constant = bsdf.textures().iter().all(|texture| texture.constant().is_some());
         let closes = closure.is_some();
-        let kind = closure.map_or(Kind::None, |closure| closure.kind());
+        let kind = closure.map_or(Kind::None as usize, |closure| closure.kind());
         let diffuse = closure.is_some_and(|closure| closure.plainly_diffuse().any()) && !bsdf.transmits();
         let closure = closure.filter(|_| constant);
         Self { emitter: *emitter, closes, kind, diffuse, mesh, uv: closure.is_none() || emitter.is_some(), closure }

@@ -52,6 +52,9 @@ impl Materials {
 
     /// Albedo of one lane.
     pub fn albedo(&self, scene: &Scene, surfaces: &Surfaces, lane: usize) -> Rgb {
+        if let Some(reflectance) = self.closures.reflectance(lane) {
+            return reflectance.clamp(Rgb::ZERO, Rgb::ONE);
+        }
         let surface = surfaces.get(lane);
         scene.bsdf(&surface).albedo(&surface)
     }

@@ -212,7 +212,7 @@ impl Scene {
         if geometry == u32::MAX {
             return KINDS;
         }
-        self.shape_infos[self.accel.shape_of(geometry, hits.instance[lane])].kind as usize
+        self.shape_infos[self.accel.shape_of(geometry, hits.instance[lane])].kind
     }
 
     /// Completes the hits of the active rays; returns the lanes that have hit a surface.
