@@ -1,22 +1,24 @@
 //! Random numbers as a pure function of seed, pixel, sample and dimension.
 //!
-//! Sample i belongs to bin i mod 8. Within a bin every two dimensions follow the first two of Sobol's sequence,
-//! shuffled and scrambled after Owen by hashes (Burley 2020); pairs, pixels and bins are scrambled apart, so that
-//! differences between bins tell variance. Every bounce owns its dimensions, whatever happened before it.
+//! Even and odd samples follow a sequence each: every two dimensions are the first two of Sobol's sequence, shuffled and
+//! scrambled after Owen by hashes (Burley 2020). Pairs, pixels and the two sequences are scrambled apart, so that the halves
+//! of the samples are independent estimates. More sequences would stratify less (docs/performance.md#sequences). Every bounce owns its dimensions, whatever happened before it.
 //!
 //! All pixels have the same position on the film in samples of the same number: the camera's ray of a pixel is then the
 //! ray that a path of its neighbour is shifted to.
 
-use crate::film::BINS;
 use crate::math::lanes::{Bits, Lanes};
 use crate::math::{Vec2, rng, vec2};
+
+/// Sequences that samples belong to in turn.
+const SEQUENCES: u32 = 2;
 
 /// Position of all samples with one index in their sequences.
 #[derive(Clone, Copy, Debug)]
 pub struct Sampler {
     seed: u64,
-    bin: u64,
-    /// Number within the bin, its bits in reverse.
+    sequence: u64,
+    /// Number within the sequence, its bits in reverse.
     reversed: u32,
 }
 
@@ -43,18 +45,18 @@ pub struct ScatterNumbers {
 impl Sampler {
     /// Sample number `index` of every pixel of a render with this seed.
     pub fn new(seed: u64, index: u32) -> Self {
-        let bin = u64::from(index) % BINS as u64;
-        Self { seed: rng::mix(seed), bin, reversed: (index / BINS as u32).reverse_bits() }
+        let sequence = u64::from(index % SEQUENCES);
+        Self { seed: rng::mix(seed), sequence, reversed: (index / SEQUENCES).reverse_bits() }
     }
 
     /// Hash that keeps the numbers of pixel number `pixel` apart from those of other pixels.
     pub fn hash(&self, pixel: u64) -> u32 {
-        fold(rng::combine(rng::combine(self.seed, pixel), self.bin))
+        fold(rng::combine(rng::combine(self.seed, pixel), self.sequence))
     }
 
     /// Position within the pixel, the same for all.
     pub fn film(&self) -> Vec2 {
-        let hash = fold(rng::combine(rng::combine(self.seed, u64::MAX), self.bin));
+        let hash = fold(rng::combine(rng::combine(self.seed, u64::MAX), self.sequence));
         let [x, y] = self.pair(Bits::splat(hash));
         vec2(x.0[0], y.0[0])
     }
@@ -191,7 +193,7 @@ mod tests {
         for first in [0, 64] {
             let points: Vec<[f32; 2]> = (first..first + 64)
                 .map(|i| {
-                    let sampler = Sampler::new(3, 8 * i + 5);
+                    let sampler = Sampler::new(3, SEQUENCES * i + 1);
                     let [u, v] = sampler.scatter(Bits::splat(sampler.hash(9)), 4).direction;
                     [u.0[0], v.0[0]]
                 })
@@ -207,14 +209,14 @@ mod tests {
     }
 
     #[test]
-    fn bins_and_pixels_are_scrambled_apart_and_the_film_is_shared() {
+    fn halves_and_pixels_are_scrambled_apart_and_the_film_is_shared() {
         let camera = |index| Sampler::new(3, index).film();
-        assert!((0..7).all(|bin| camera(bin) != camera(bin + 1)));
+        assert!((0..7).all(|index| camera(index) != camera(index + 1)));
         let lens = |index, pixel| {
             let sampler = Sampler::new(3, index);
             sampler.lens(Bits::splat(sampler.hash(pixel)))[0].0[0]
         };
-        // Correlation over many pixels, of neighbours and of bins; five standard errors.
+        // Correlation over many pixels, of neighbours and of halves; five standard errors.
         let n = 4096;
         let sum = |f: &dyn Fn(u64) -> f32| (0..n).map(|i| f64::from(f(i))).sum::<f64>() / n as f64;
         let bound = 5.0 / 12.0 / (n as f64).sqrt();

@@ -63,7 +63,7 @@ pub struct Args {
     /// EXR file of all recorded layers, for `fluxion reconstruct`
     #[arg(long, value_name = "FILE")]
     layers: Option<PathBuf>,
-    /// Record the statistics of eight independent groups of samples in the layers
+    /// Record the statistics of eight groups of samples, the even ones independent of the odd ones, in the layers
     #[arg(long, requires = "layers")]
     bins: bool,
     /// Record ambient occlusion in the layers
