@@ -67,9 +67,11 @@ impl Graph {
         }
         let mut graph = Self { first, edges, diagonal: Vec::new(), screen };
         let sum = |i: usize| graph.screen[i] + graph.edges(i).iter().map(|edge| edge.1).sum::<f32>();
+        graph.diagonal = (0..nodes).into_par_iter().map(sum).collect();
         // A node without any weight keeps its value.
-        graph.diagonal =
-            (0..nodes).into_par_iter().map(|i| Some(sum(i)).filter(|&sum| sum > 0.0).unwrap_or(1.0)).collect();
+        for i in (0..nodes).filter(|&i| graph.diagonal[i] <= 0.0).collect::<Vec<_>>() {
+            (graph.screen[i], graph.diagonal[i]) = (1.0, 1.0);
+        }
         graph
     }
 
@@ -97,9 +99,12 @@ impl Graph {
     /// Row `node` of the matrix times `x`.
     #[inline(always)]
     pub fn row(&self, node: usize, x: &[Quad]) -> Quad {
-        let mut sum = x[node].map(|x| self.diagonal[node] * x);
+        // Differences first: strong edges between values that are nearly the same would cancel to rounding errors, which may
+        // be larger than all that a weak screening adds up to.
+        let own = x[node];
+        let mut sum = own.map(|own| self.screen[node] * own);
         for &(to, weight) in self.edges(node) {
-            (0..4).for_each(|c| sum[c] -= weight * x[to as usize][c]);
+            (0..4).for_each(|c| sum[c] += weight * (own[c] - x[to as usize][c]));
         }
         sum
     }

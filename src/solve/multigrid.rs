@@ -354,6 +354,21 @@ mod tests {
     }
 
     #[test]
+    fn weak_screening_decides_values_along_strong_edges() {
+        // Columns of one value each, seven decades of weights: products of weights and values are far larger than what decides.
+        let (width, height) = (20, 40);
+        let edges = Edges::cross((width, height));
+        let weights: Vec<f32> = (0..edges.len()).map(|edge| [1e-2, 1e6][edges.kind(edge)]).collect();
+        let graph = Graph::new(&edges, &weights, &vec![0.1; width * height]);
+        let exact: Vec<Quad> = (0..width * height).map(|i| [300.0 * random(4, i % width); 4]).collect();
+        let b = apply(&graph, &exact);
+        let solved = Multigrid::new(graph).solve(&b, vec![[0.0; 4]; width * height], 1e-3).x;
+        for (a, b) in solved.iter().zip(&exact) {
+            assert!((a[0] - b[0]).abs() < 0.01 * b[0] + 0.1, "{} instead of {}", a[0], b[0]);
+        }
+    }
+
+    #[test]
     fn threads_do_not_matter() {
         let solve = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
