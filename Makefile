@@ -6,7 +6,7 @@ PACKAGES = g++ pkg-config libclang-dev libembree-dev libopenimageio-dev
 TEST_PACKAGES = chromium
 SCENE = scenes/cornell-box/scene.xml
 
-.PHONY: demo test packages check licences memcheck
+.PHONY: demo test packages check licences memcheck train-blend
 
 demo: packages
 	cargo build --release
@@ -40,6 +40,12 @@ memcheck: packages
 	@sh .ci/packages valgrind
 	RUSTFLAGS="--cfg baseline" cargo build --release --target-dir target/memcheck
 	tools/memcheck/run
+
+# The weights of `blend` from nothing, in training/: hours, resumable. Building and using Fluxion needs none of it.
+train-blend: packages
+	@sh .ci/packages python3-venv
+	cargo build --release
+	tools/train/blend.sh training
 
 # Installs what is missing, through sudo when not root. Elsewhere than on Debian it says what is needed.
 packages:

@@ -39,12 +39,14 @@ pub mod film;
 pub mod plan;
 pub mod render;
 
+pub mod nn;
 pub mod reconstruct;
 pub mod solve;
 
 pub mod adaptive;
 pub mod checkpoint;
 
+pub mod dataset;
 pub mod metrics;
 pub mod reference;
 pub mod validate;

@@ -124,7 +124,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
 fn methods(list: Option<&str>) -> Result<Vec<String>> {
     let mut methods: Vec<String> = Vec::new();
     match list {
-        None => methods.extend(METHODS.iter().map(|method| method.id.to_owned())),
+        None => methods
+            .extend(METHODS.iter().map(|method| method.id.to_owned()).filter(|id| reconstruct::parse(id).is_ok())),
         Some(list) => {
             for part in list.split(',').map(str::trim) {
                 match methods.last_mut() {

@@ -3,6 +3,7 @@
 mod bench;
 mod checkpoint;
 mod compare;
+mod dataset;
 mod info;
 mod interrupt;
 mod merge;
@@ -44,6 +45,8 @@ enum Command {
     Bench(bench::Args),
     /// Render the reference image of a scene, in waves that can be continued
     Reference(reference::Args),
+    /// Render training data for denoisers: inputs of several sample counts and targets, of many scenes
+    Dataset(dataset::Args),
     /// Add up the samples of checkpoints, from other machines or seeds
     Merge(merge::Args),
     /// Show what a scene holds and needs, or what Fluxion knows
@@ -63,6 +66,7 @@ pub fn run(args: Args) -> Result<ExitCode> {
         Command::Compare(args) => compare::run(&args),
         Command::Bench(args) => bench::run(&args),
         Command::Reference(args) => reference::run(&args),
+        Command::Dataset(args) => dataset::run(&args),
         Command::Merge(args) => merge::run(&args),
         Command::Info(args) => info::run(&args),
         Command::Stress(args) => stress::run(&args),

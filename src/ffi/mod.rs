@@ -3,7 +3,6 @@
 pub mod embree;
 mod exr_header;
 pub mod memory;
-#[cfg(feature = "oidn")]
 pub mod oidn;
 pub mod oiio;
 

@@ -1,8 +1,8 @@
 //! The table of layers: every image that a film develops into, with its name in files, its unit and range, and the
 //! statistic that its values come from.
 
-use super::BINS;
 use super::source::{Source, X, Y};
+use super::{BINS, Needs};
 
 /// A named image. The bins' layers carry the bin's number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -311,6 +311,11 @@ impl Layer {
     /// Whether a value below zero is a mistake, as in variances and counts. Filtered radiance may be negative.
     pub fn is_never_negative(self) -> bool {
         matches!(self, Self::Samples | Self::EdgeSamples | Self::Rejected) || self.info().name.ends_with("variance")
+    }
+
+    /// Whether films with these needs develop into it.
+    pub fn is_in(self, needs: Needs) -> bool {
+        self.info().source.is_developed(needs)
     }
 
     /// Number of layers.

@@ -3,7 +3,6 @@
 pub mod channels;
 pub mod io;
 pub mod nl_means;
-#[cfg(feature = "oidn")]
 pub mod oidn;
 pub mod planes;
 

@@ -2,7 +2,12 @@
 
 use super::Image;
 use crate::error::{Error, Result};
-use crate::ffi::oidn::Device;
+use crate::ffi::oidn::{self, Device};
+
+/// Fails if Open Image Denoise is not there; the error says how to get it.
+pub fn check() -> Result<()> {
+    oidn::check().map_err(|what| Error::backend("open image denoise", what))
+}
 
 /// Denoises linear radiance with the help of albedo and normal. `clean` filters these first, which Open Image Denoise
 /// calls accurate prefiltering.

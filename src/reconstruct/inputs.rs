@@ -44,12 +44,15 @@ impl<'a> Inputs<'a> {
 
     /// A layer times `scale`.
     pub fn planes(&self, layer: Layer, scale: f32) -> Result<Planes> {
-        let image = self.frame.require(layer)?;
-        let channels = image.channels;
-        Ok(Planes::from_fn(self.width, self.height, channels, |c, x, y| {
+        Ok(self.mirrored(self.frame.require(layer)?, scale))
+    }
+
+    /// An image of the frame's size, times `scale`.
+    pub fn mirrored(&self, image: &Image, scale: f32) -> Planes {
+        Planes::from_fn(self.width, self.height, image.channels, |c, x, y| {
             let (x, y) = (self.inside(x, image.width), self.inside(y, image.height));
-            image.data[(y * image.width + x) * channels + c] * scale
-        }))
+            image.data[(y * image.width + x) * image.channels + c] * scale
+        })
     }
 
     /// Share of every pixel that is covered, if the frame has it.

@@ -1,6 +1,7 @@
 //! Reconstructions: methods that make an image from a frame.
 
 mod apr;
+mod blend;
 mod control_variate;
 mod edge_means;
 mod feature;
@@ -13,7 +14,6 @@ mod l2;
 mod least_trimmed;
 mod nfor;
 mod nlm;
-#[cfg(feature = "oidn")]
 mod oidn;
 mod parameters;
 mod primal;
@@ -157,7 +157,7 @@ pub const METHODS: &[Method] = &[
     frgr::METHOD,
     feature::METHOD,
     apr::METHOD,
-    #[cfg(feature = "oidn")]
+    blend::METHOD,
     oidn::METHOD,
 ];
 

@@ -3,18 +3,19 @@
 use super::{Context, Method, Parameter, Parameters, Reconstruction, Solution, Traits};
 use crate::error::Result;
 use crate::film::{Frame, Layer, Needs};
-use crate::image::oidn::denoise;
+use crate::image::Image;
+use crate::image::oidn::{check, denoise};
 
 /// `oidn`.
 pub const METHOD: Method = Method {
     id: "oidn",
-    summary: "Open Image Denoise, a trained network, with albedo and normal; path tracing only",
+    summary: "Open Image Denoise, a trained network, with albedo and normal; path tracing only; it has to be installed",
     traits: Traits { exact: false, ..Traits::FILTER },
     parameters: &[
         Parameter {
             name: "prefilter",
-            default: "none",
-            summary: "of albedo and normal: `none`, or `accurate`, each denoised by itself first",
+            default: "accurate",
+            summary: "of albedo and normal: `accurate`, each denoised by itself first, or `none`",
         },
         Parameter {
             name: "direct",
@@ -26,7 +27,8 @@ pub const METHOD: Method = Method {
 };
 
 fn make(parameters: &Parameters) -> Result<Box<dyn Reconstruction>> {
-    let accurate = parameters.choice("prefilter", &["none", "accurate"])? == "accurate";
+    let accurate = parameters.choice("prefilter", &["accurate", "none"])? == "accurate";
+    check()?;
     Ok(Box::new(Oidn { accurate, direct: parameters.switch("direct")? }))
 }
 
@@ -41,15 +43,20 @@ impl Reconstruction for Oidn {
     }
 
     fn reconstruct(&self, frame: &Frame, _context: &Context) -> Result<Solution> {
-        let (albedo, normal) = (frame.require(Layer::Albedo)?, frame.require(Layer::Normal)?);
-        let direct = frame.get(Layer::Direct).filter(|_| self.direct);
-        let mut color = frame.require(Layer::Color)?.clone();
-        direct.iter().for_each(|direct| color.add(direct));
-        let mut image = denoise(&color, albedo, normal, self.accurate)?;
-        // They are added again to every method's image.
-        direct.iter().for_each(|direct| {
-            image.data.iter_mut().zip(&direct.data).for_each(|(value, direct)| *value -= direct);
-        });
+        let image = clean(frame, self.accurate, frame.get(Layer::Direct).filter(|_| self.direct))?;
         Ok(Solution { image, alpha: None, error: None, notes: Vec::new() })
     }
+}
+
+/// A frame's scattered light, denoised: together with the light of directly seen emitters, if that is given, which is
+/// subtracted again, since it is added to every method's image.
+pub fn clean(frame: &Frame, accurate: bool, direct: Option<&Image>) -> Result<Image> {
+    let (albedo, normal) = (frame.require(Layer::Albedo)?, frame.require(Layer::Normal)?);
+    let mut color = frame.require(Layer::Color)?.clone();
+    direct.iter().for_each(|direct| color.add(direct));
+    let mut image = denoise(&color, albedo, normal, accurate)?;
+    direct.iter().for_each(|direct| {
+        image.data.iter_mut().zip(&direct.data).for_each(|(value, direct)| *value -= direct);
+    });
+    Ok(image)
 }

@@ -14,6 +14,9 @@ pub const CHUNK: usize = 8192;
 /// Number of pairwise aggregations from one level to the next.
 const ROUNDS: u32 = 3;
 
+/// Screening, as a share of its edges' weights, of every node where there is none at all.
+const LEAST_SCREEN: f32 = 1e-7;
+
 /// Most nodes that a node of the next level stands for.
 pub const MEMBERS: usize = 1 << ROUNDS;
 
@@ -68,6 +71,10 @@ impl Graph {
         let mut graph = Self { first, edges, diagonal: Vec::new(), screen };
         let sum = |i: usize| graph.screen[i] + graph.edges(i).iter().map(|edge| edge.1).sum::<f32>();
         graph.diagonal = (0..nodes).into_par_iter().map(sum).collect();
+        // Without any screening the matrix is singular.
+        if graph.screen.iter().all(|&screen| screen <= 0.0) {
+            graph.screen = graph.diagonal.iter().map(|diagonal| LEAST_SCREEN * diagonal).collect();
+        }
         // A node without any weight keeps its value.
         for i in (0..nodes).filter(|&i| graph.diagonal[i] <= 0.0).collect::<Vec<_>>() {
             (graph.screen[i], graph.diagonal[i]) = (1.0, 1.0);

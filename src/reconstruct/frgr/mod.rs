@@ -10,6 +10,7 @@
 //! Every pixel of the result is a convex combination of the sampled colours around it. What their differences should
 //! be is known from the gradients, enhanced into those of an image; how much noise they carry from their variances.
 
+mod denoise;
 mod enhance;
 mod filter;
 mod form;
@@ -20,6 +21,7 @@ mod resample;
 
 use std::borrow::Cow;
 
+use self::denoise::{Denoiser, denoise};
 use self::enhance::{Enhanced, enhance};
 use self::filter::{FilterProblem, Solver, Term};
 use self::form::Form;
@@ -31,8 +33,7 @@ use super::{Context, EdgeTrust, Method, Note, Parameter, Parameters, Reconstruct
 use crate::error::{Error, Result};
 use crate::film::{Frame, Needs};
 use crate::image::Image;
-use crate::image::nl_means::rdfc::{self, Denoised};
-use crate::image::nl_means::{Guide, Guides};
+use crate::image::nl_means::rdfc::Denoised;
 use crate::image::planes::Planes;
 use crate::solve::poisson;
 
@@ -54,6 +55,11 @@ pub const METHOD: Method = Method {
         parameter("albedo", "on", "whether the albedo guides, `on` or `off`; left out when the layer is missing"),
         parameter("normal", "on", "whether the normal guides, `on` or `off`; left out when the layer is missing"),
         parameter("denoised", "on", "whether the filter is held near the denoised image, `on` or `off`"),
+        parameter(
+            "denoiser",
+            "rdfc",
+            "of that image: `rdfc`, non-local means, or `oidn`, Open Image Denoise, if installed",
+        ),
         parameter("enhance", "on", "whether gradients are weighted by their worth, `on` or `off`"),
     ],
     make,
@@ -67,6 +73,7 @@ struct Frgr {
     guided: bool,
     features: Vec<Kind>,
     denoised: bool,
+    denoiser: Denoiser,
     enhance: bool,
 }
 
@@ -86,6 +93,7 @@ fn make(parameters: &Parameters) -> Result<Box<dyn Reconstruction>> {
         guided: resample == "glu",
         features,
         denoised: parameters.switch("denoised")?,
+        denoiser: parameters.choice("denoiser", &["rdfc", "oidn"])?.parse()?,
         enhance: parameters.switch("enhance")?,
     }))
 }
@@ -123,7 +131,8 @@ impl Reconstruction for Frgr {
         notes.add("dx", &level.gradients[0], inputs.scale);
         notes.add("dy", &level.gradients[1], inputs.scale);
         (context.progress)("denoise", 0.1);
-        let denoised = self.denoise(&level, rows, context);
+        let report = |share| (context.progress)("denoise", 0.1 + 0.35 * share);
+        let denoised = denoise(self.denoiser, (&level, self.form), (&inputs, frame), rows, &report)?;
         notes.add("denoised", &denoised.image, inputs.scale);
         let Denoised { image, error } = denoised;
         (context.progress)("pyramid", 0.45);
@@ -177,18 +186,6 @@ impl Frgr {
         }
         let level = Level { color, variance, gradients: [dx, dy], noise: [dx_noise, dy_noise], features };
         Ok(if self.form == Form::Best { level.with_variance_floor() } else { level })
-    }
-
-    fn denoise(&self, level: &Level, rows: usize, context: &Context) -> Denoised {
-        let color = Guide { mean: level.color.clone(), variance: level.variance.sum(), tolerance: None };
-        let guides = Guides { color, features: level.features.iter().map(Feature::guide).collect() };
-        let options = rdfc::Options {
-            window: self.form.window(),
-            symmetric: self.form == Form::Code,
-            choice: self.form.choice(),
-            rows,
-        };
-        rdfc::denoise(&guides, options, &|share| (context.progress)("denoise", 0.1 + 0.35 * share))
     }
 
     /// The next level, and how to get to it and back.

@@ -1,0 +1,169 @@
+//! `fluxion dataset`.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use anyhow::{Context as _, Result, bail};
+use fluxion::dataset::{self, Layout, Number, Recipe};
+use fluxion::error::Error;
+use fluxion::film::{EdgeNeed, Needs};
+use fluxion::reconstruct;
+
+use super::progress;
+use super::terminal::out;
+
+/// Options of `dataset`.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Scene files, Mitsuba XML; a frame has the name of its file, or of the folder of a scene.xml
+    #[arg(required = true, value_name = "SCENE")]
+    scenes: Vec<PathBuf>,
+    /// Folder for the files
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+    /// Numbers of samples per pixel; each includes the samples of those before it
+    #[arg(long, value_delimiter = ',', default_value = "2,4,8,16,32,64,128", value_parser = clap::value_parser!(u32).range(1..1 << 24))]
+    spp: Vec<u32>,
+    /// Samples per pixel of the target, which has another seed
+    #[arg(long, default_value_t = 4096, value_name = "SPP", value_parser = clap::value_parser!(u32).range(2..1 << 24))]
+    reference: u32,
+    /// Method that makes the target, without bias: `primal`, or `l2`, which has less noise
+    #[arg(long, default_value = "primal", value_name = "METHOD")]
+    target: String,
+    /// Method whose image and estimated error are stored, too; may be given again
+    #[arg(long = "method", value_name = "NAME[:KEY=VALUE,...]")]
+    methods: Vec<String>,
+    /// Store the intermediate images of these methods, too, without directly seen emitters
+    #[arg(long, requires = "methods")]
+    notes: bool,
+    /// Statistics to store besides the colour
+    #[arg(long, value_delimiter = ',', default_value = "features", value_enum, value_name = "WHAT")]
+    layers: Vec<Part>,
+    /// Arrangement of the files
+    #[arg(long, default_value = "npy", value_enum)]
+    layout: Arrangement,
+    /// Store half floats
+    #[arg(long)]
+    half: bool,
+    /// Seed that every scene mixes its own with
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    #[command(flatten)]
+    options: super::scene::Args,
+    /// Keep the frames that are there, of the same settings, and make the rest
+    #[arg(long)]
+    resume: bool,
+    /// Threads to work with (0: one per core)
+    #[arg(long, default_value_t = 0, value_parser = super::parse_threads)]
+    threads: usize,
+    /// Show no progress
+    #[arg(short, long)]
+    quiet: bool,
+}
+
+/// Statistics that can be stored.
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Part {
+    /// Nothing else.
+    Color,
+    /// Albedo, normal and depth.
+    Features,
+    /// Differences to the neighbouring pixels.
+    Gradients,
+    /// Means of eight groups of samples, whose even and odd ones are independent.
+    Bins,
+    /// Ambient occlusion.
+    Occlusion,
+    /// World position.
+    Position,
+}
+
+/// Names of the layouts.
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum Arrangement {
+    /// NumPy arrays of height, width and channels, a JSON beside them.
+    Npy,
+    /// EXR images as the training of Open Image Denoise takes them.
+    Oidn,
+}
+
+impl Args {
+    fn recipe(&self) -> Result<Recipe> {
+        let (mut spp, has) = (self.spp.clone(), |part| self.layers.contains(&part));
+        spp.sort_unstable();
+        spp.dedup();
+        for method in self.methods.iter().chain([&self.target]) {
+            reconstruct::parse(method)?;
+        }
+        if !self.reference.is_multiple_of(2) {
+            bail!(Error::Usage("--reference is of two halves: give it an even number".into()));
+        }
+        let layout = match self.layout {
+            Arrangement::Npy => Layout::Npy,
+            Arrangement::Oidn => Layout::Oidn,
+        };
+        let layers = Needs {
+            features: has(Part::Features) || layout == Layout::Oidn,
+            edges: if has(Part::Gradients) { EdgeNeed::Sampled } else { EdgeNeed::Off },
+            bins: has(Part::Bins),
+            occlusion: has(Part::Occlusion),
+            position: has(Part::Position),
+            ..Needs::default()
+        };
+        Ok(Recipe {
+            spp,
+            reference: self.reference,
+            target: self.target.clone(),
+            methods: self.methods.clone(),
+            notes: self.notes,
+            layers,
+            layout,
+            number: if self.half { Number::Float16 } else { Number::Float32 },
+            seed: self.seed,
+        })
+    }
+}
+
+/// Renders frame after frame.
+pub fn run(args: &Args) -> Result<ExitCode> {
+    super::use_threads(args.threads)?;
+    let recipe = args.recipe()?;
+    let folder = &args.output;
+    std::fs::create_dir_all(folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
+    let names = args.scenes.iter().map(|path| name(path)).collect::<Result<Vec<_>>>()?;
+    let mut due = Vec::new();
+    if let Some((_, name)) = names.iter().enumerate().find(|(k, name)| names[..*k].contains(name)) {
+        bail!(Error::Usage(format!("two scenes would be the frame {name}: give their files other names")));
+    }
+    for (k, name) in names.iter().enumerate() {
+        let there = dataset::is_there(folder, name, &recipe)?;
+        if there && !args.resume {
+            bail!(Error::Usage(format!("{} has the frame {name}: keep it with --resume", folder.display())));
+        }
+        due.extend((!there).then_some(k));
+    }
+    let (stop, bar) = (super::interrupt::stop_on_signal()?, progress::bar(args.quiet));
+    let total = due.len() as f32;
+    for (done, &k) in due.iter().enumerate() {
+        bar.set_message(names[k].clone());
+        let report = |share| progress::set(&bar, (done as f32 + share) / total);
+        report(0.0);
+        let scene = super::scene::load(&args.scenes[k], &args.options.options())?;
+        let frame = (folder.as_path(), names[k].as_str());
+        if !dataset::make((&scene, &args.scenes[k]), frame, &recipe, &stop, &report)? {
+            break;
+        }
+    }
+    bar.finish_and_clear();
+    let there = names.iter().filter(|name| dataset::is_there(folder, name, &recipe).unwrap_or(false)).count();
+    out!("{}: {there} of {} frames", folder.display(), names.len())?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Name of a scene's frame.
+fn name(path: &Path) -> Result<String> {
+    let file = path.file_stem().map(|name| name.to_string_lossy().into_owned());
+    let of_folder = || Some(path.canonicalize().ok()?.parent()?.file_name()?.to_string_lossy().into_owned());
+    let name = file.filter(|name| name != "scene").or_else(of_folder);
+    name.with_context(|| format!("{} is no scene file", path.display()))
+}

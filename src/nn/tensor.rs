@@ -1,0 +1,99 @@
+//! Images of any number of channels, as networks pass them on.
+
+use rayon::prelude::*;
+
+/// Values of a grid of pixels, row by row, all channels of a pixel together.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tensor {
+    /// Pixels in a row.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// Values of a pixel.
+    pub channels: usize,
+    /// The values.
+    pub data: Vec<f32>,
+}
+
+impl Tensor {
+    /// Zeros.
+    pub fn new(width: usize, height: usize, channels: usize) -> Self {
+        Self { width, height, channels, data: vec![0.0; width * height * channels] }
+    }
+
+    /// Values of a function of column and row, which fills the channels of a pixel.
+    pub fn from_fn(
+        width: usize,
+        height: usize,
+        channels: usize,
+        fill: impl Fn(usize, usize, &mut [f32]) + Sync,
+    ) -> Self {
+        let mut made = Self::new(width, height, channels);
+        made.rows_mut().for_each(|(y, row)| {
+            row.chunks_exact_mut(channels).enumerate().for_each(|(x, pixel)| fill(x, y, pixel));
+        });
+        made
+    }
+
+    /// The channels of a pixel.
+    #[inline(always)]
+    pub fn pixel(&self, x: usize, y: usize) -> &[f32] {
+        &self.data[(y * self.width + x) * self.channels..][..self.channels]
+    }
+
+    /// A row.
+    pub fn row(&self, y: usize) -> &[f32] {
+        let length = self.width * self.channels;
+        &self.data[y * length..][..length]
+    }
+
+    /// Rows with their numbers, to be filled in parallel.
+    pub fn rows_mut(&mut self) -> impl IndexedParallelIterator<Item = (usize, &mut [f32])> {
+        let length = (self.width * self.channels).max(1);
+        self.data.par_chunks_mut(length).enumerate()
+    }
+
+    /// Rows from `first` on.
+    pub fn band(&self, first: usize, rows: usize) -> Self {
+        let length = self.width * self.channels;
+        Self { height: rows, data: self.data[first * length..][..rows * length].to_vec(), ..*self }
+    }
+
+    /// The channels of tensors of the same size after each other.
+    pub fn concat(parts: &[&Self]) -> Self {
+        let (width, height) = (parts[0].width, parts[0].height);
+        assert!(parts.iter().all(|part| (part.width, part.height) == (width, height)), "tensors of the same size");
+        let channels = parts.iter().map(|part| part.channels).sum();
+        Self::from_fn(width, height, channels, |x, y, pixel| {
+            let mut rest = pixel;
+            for part in parts {
+                let (own, others) = rest.split_at_mut(part.channels);
+                own.copy_from_slice(part.pixel(x, y));
+                rest = others;
+            }
+        })
+    }
+}
+
+/// The network `apply` on bands of about `rows` rows, so that its own memory is bounded. The values are those of all rows at
+/// once, if no output depends on inputs more than `reach` rows away and the network halves sizes by `multiple` at most.
+pub fn in_bands(
+    input: &Tensor,
+    (rows, multiple, reach): (usize, usize, usize),
+    apply: impl Fn(&Tensor) -> Tensor,
+) -> Tensor {
+    let rows = rows.next_multiple_of(multiple);
+    if rows >= input.height {
+        return apply(input);
+    }
+    let (mut data, mut channels) = (Vec::new(), 0);
+    for first in (0..input.height).step_by(rows) {
+        let (start, end) = (first.saturating_sub(reach) / multiple * multiple, input.height.min(first + rows));
+        let bottom = input.height.min((end + reach).next_multiple_of(multiple));
+        let band = apply(&input.band(start, bottom - start));
+        let length = band.width * band.channels;
+        data.extend_from_slice(&band.data[(first - start) * length..(end - start) * length]);
+        channels = band.channels;
+    }
+    Tensor { channels, data, ..*input }
+}

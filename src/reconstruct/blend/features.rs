@@ -1,0 +1,128 @@
+//! Evidence about candidates: how they differ from each other and, beyond noise, from the sampled colours. tools/train/blend.py
+//! computes the same for training.
+
+use crate::error::Result;
+use crate::film::Layer;
+use crate::image::planes::Planes;
+use crate::nn::Tensor;
+use crate::reconstruct::inputs::Inputs;
+
+/// Radii of the windows that residuals are averaged over, by themselves and squared.
+const RESIDUAL: usize = 3;
+const BIAS: usize = 7;
+
+/// Squared residuals beyond the noise may be this share of it before an image counts as biased; more where few samples, fewer
+/// than this number, say little about the noise.
+const TRUST: f32 = 0.5;
+const FEW: f32 = 16.0;
+
+/// Least share of the noise that a candidate is believed to have as error.
+const LEAST_ERROR: f32 = 0.02;
+
+/// True error over the claimed one, on frames that the network was not trained on.
+const CALIBRATION: f32 = 1.0;
+
+/// Largest distance that counts: its square and sums of those are still floats.
+const MOST: f32 = 1e15;
+
+/// Luminance below which differences count as absolute, in units of the typical luminance.
+const DARK: f32 = 0.1;
+
+/// Planes with one channel for every candidate, and planes of one channel. Radiance is in units of its typical luminance.
+pub struct Evidence {
+    luminance: Planes,
+    /// Sampled colour less candidate, mean over a window.
+    residual: Planes,
+    /// Squared distance from the sampled colours less their noise, mean over a window.
+    bias: Planes,
+    /// Variance of the sampled colours.
+    variance: Planes,
+    /// Its means over the windows of residuals and of biases.
+    residual_noise: Planes,
+    noise: Planes,
+    /// Expected squared error that the last method claims.
+    claimed: Planes,
+    albedo: Planes,
+}
+
+impl Evidence {
+    /// Evidence from candidates, of which the last one is the sampled colour.
+    pub fn new(inputs: &Inputs, images: &[Planes], claimed: Option<Planes>) -> Result<Self> {
+        let mean = |planes: &Planes| planes.sum().map(|sum| sum / 3.0);
+        let [color, variance] = inputs.color()?;
+        let variance = mean(&variance).map(|variance| variance.min(MOST * MOST));
+        let all = |of: &dyn Fn(&Planes) -> Planes| {
+            let mut planes = images.iter().map(of);
+            let first = planes.next().expect("there are candidates");
+            planes.fold(first, |all, next| all.and(&next))
+        };
+        let luminance = all(&mean);
+        let sampled = mean(&color);
+        let residual = all(&|image| sampled.zip(&mean(image), |sampled, own| sampled - own).box_mean(RESIDUAL));
+        let bias = all(&|image| {
+            let square = mean(&color.zip(image, |sampled, own| (sampled - own).clamp(-MOST, MOST).powi(2)));
+            square.zip(&variance, |square, variance| square - variance).box_mean(BIAS)
+        });
+        let noise = variance.box_mean(BIAS).map(|noise| noise.max(1e-9));
+        let residual_noise = variance.box_mean(RESIDUAL);
+        let claimed = claimed.map_or_else(|| variance.clone(), |claimed| mean(&claimed));
+        let albedo = mean(&inputs.planes(Layer::Albedo, 1.0)?);
+        Ok(Self { luminance, residual, bias, variance, residual_noise, noise, claimed, albedo })
+    }
+
+    /// Features of the network: four for every candidate, then five of the pixel.
+    pub fn features(&self, spp: f32) -> Tensor {
+        let (count, side) = (self.luminance.channels(), (2 * RESIDUAL + 1) as f32);
+        let (width, height) = (self.luminance.width, self.luminance.height);
+        let samples = libm::log2f(spp) / 4.0;
+        Tensor::from_fn(width, height, 4 * count + 5, |x, y, pixel| {
+            let (x, y) = (x as isize, y as isize);
+            let at = |planes: &Planes| planes.at(0, x, y);
+            let luminance = |k: usize| self.luminance.at(k, x, y);
+            let middle = ((0..count).map(luminance).sum::<f32>() / count as f32).max(0.0);
+            let unit = middle + DARK;
+            let deviation = (at(&self.residual_noise) / (side * side) + 1e-9).sqrt();
+            let noise = at(&self.noise);
+            for k in 0..count {
+                let residual = self.residual.at(k, x, y);
+                pixel[k] = libm::asinhf(3.0 * (luminance(k) - middle) / unit);
+                pixel[count + k] = libm::asinhf(3.0 * residual / unit);
+                pixel[2 * count + k] = libm::asinhf(residual / deviation);
+                pixel[3 * count + k] = libm::asinhf(self.bias.at(k, x, y) / noise);
+            }
+            let relative = |square: f32| 0.5 * libm::logf(square.max(0.0) + 1e-7) - libm::logf(unit);
+            let rest = [
+                relative(at(&self.variance)),
+                libm::logf(unit),
+                relative(at(&self.claimed)),
+                at(&self.albedo),
+                samples,
+            ];
+            pixel[4 * count..].copy_from_slice(&rest);
+        })
+    }
+
+    /// Weights after the safety rule: candidates that differ from the sampled colours by more than noise lose theirs to these.
+    pub fn safe(&self, weights: Planes, spp: f32) -> Planes {
+        let (last, allowed) = (weights.channels() - 1, TRUST * (1.0 + FEW / spp));
+        let kept = |k: usize, x: isize, y: isize| {
+            let trust = allowed * self.noise.at(0, x, y) / self.bias.at(k, x, y).max(1e-12);
+            weights.at(k, x, y) * trust.min(1.0)
+        };
+        Planes::from_fn(weights.width, weights.height, last + 1, |k, x, y| {
+            let (x, y) = (x as isize, y as isize);
+            if k < last { kept(k, x, y) } else { 1.0 - (0..last).map(|k| kept(k, x, y)).sum::<f32>() }
+        })
+    }
+
+    /// Expected squared error of the sum by weights, mean over the channels.
+    pub fn error(&self, weights: &Planes) -> Planes {
+        let last = weights.channels() - 1;
+        Planes::from_fn(weights.width, weights.height, 1, |_, x, y| {
+            let (x, y) = (x as isize, y as isize);
+            let least = LEAST_ERROR * self.noise.at(0, x, y);
+            let biased = (0..last).map(|k| weights.at(k, x, y) * self.bias.at(k, x, y).max(least)).sum::<f32>();
+            CALIBRATION * (biased + weights.at(last, x, y) * self.variance.at(0, x, y))
+        })
+    }
+}

@@ -1,0 +1,65 @@
+"""Frames of `fluxion dataset`, as a training loop takes them."""
+import glob
+import json
+import os
+
+import numpy as np
+
+# Least typical luminance, and regularisation of relMSE.
+DARK, EPSILON = 1e-18, 0.01
+# Endings of the names of intermediate images.
+INNER = ("_denoised", "_level0_enhanced")
+
+
+def typical_luminance(colour):
+    """Geometric mean in which dark pixels count as a thousandth of the mean, as src/reconstruct/inputs.rs has it."""
+    luminance = np.maximum(colour.mean(-1, dtype=np.float64), 0)
+    mean = luminance.mean()
+    return max(float(np.exp(np.log(luminance + 1e-3 * mean).mean())), DARK) if mean > 0 else 1.0
+
+
+class Frame:
+    """A frame at one number of samples; radiance in units of its typical luminance, without directly seen emitters."""
+
+    def __init__(self, folder, manifest, spp):
+        self.name, self.spp = manifest["name"], spp
+        self.array = np.load(os.path.join(folder, "%s_%04dspp.npy" % (self.name, spp))).astype(np.float32)
+        self.columns = manifest["channels"]
+        target = np.load(os.path.join(folder, self.name + "_ref.npy")).astype(np.float32)
+        self.scale = 1 / typical_luminance(self.get("", "RGB"))
+        self.direct = self.radiance("direct")
+        # Samples may not have met light that the target has; both halves of it are kept for errors without their noise.
+        self.target = target[..., :3] * self.scale - self.direct
+        self.difference = target[..., 3:6] * self.scale
+        self.floor = manifest["floor"]
+
+    def get(self, name, channels):
+        prefix = name + "." if name else ""
+        return self.array[..., [self.columns.index(prefix + c) for c in channels]]
+
+    def radiance(self, name):
+        return self.get(name, "RGB") * self.scale
+
+    def image(self, method):
+        """A method's image, or the sampled colours; intermediate images are without directly seen emitters already."""
+        inner = not method or method.endswith(INNER)
+        return self.radiance(method) - (0 if inner else self.direct)
+
+    def rel_mse(self, image):
+        """relMSE against the target, the target's own noise taken off."""
+        whole = self.target + self.direct
+        noise = 0.25 * self.difference ** 2
+        scale = 1 / self.scale
+        error = (image - self.target) ** 2 - noise
+        return float((error * scale ** 2 / ((whole * scale) ** 2 + EPSILON)).mean())
+
+
+def load(folders):
+    """All frames of some folders, and for each its manifest's name, in the order of names and sample counts."""
+    frames = []
+    for folder in folders:
+        for path in glob.glob(os.path.join(folder, "*.json")):
+            with open(path) as file:
+                manifest = json.load(file)
+            frames += [Frame(folder, manifest, spp) for spp in manifest["recipe"]["spp"]]
+    return sorted(frames, key=lambda frame: (frame.name, frame.spp))
