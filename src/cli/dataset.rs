@@ -102,6 +102,13 @@ impl Args {
             Arrangement::Npy => Layout::Npy,
             Arrangement::Oidn => Layout::Oidn,
         };
+        if layout == Layout::Oidn && (self.notes || self.layers != [Part::Features]) {
+            bail!(Error::Usage("--layout oidn has albedo and normal only: leave --layers and --notes out".into()));
+        }
+        let columns: Vec<_> = self.methods.iter().map(|method| dataset::column(method)).collect();
+        if let Some((k, _)) = columns.iter().enumerate().find(|(k, column)| columns[..*k].contains(column)) {
+            bail!(Error::Usage(format!("--method {} would have the names of another one's images", self.methods[k])));
+        }
         let layers = Needs {
             features: has(Part::Features) || layout == Layout::Oidn,
             edges: if has(Part::Gradients) { EdgeNeed::Sampled } else { EdgeNeed::Off },
@@ -117,6 +124,7 @@ impl Args {
             methods: self.methods.clone(),
             notes: self.notes,
             layers,
+            scene_options: self.options.as_text(),
             layout,
             number: if self.half { Number::Float16 } else { Number::Float32 },
             seed: self.seed,
@@ -130,7 +138,11 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let recipe = args.recipe()?;
     let folder = &args.output;
     std::fs::create_dir_all(folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
-    let names = args.scenes.iter().map(|path| name(path)).collect::<Result<Vec<_>>>()?;
+    let mut names = args.scenes.iter().map(|path| name(path)).collect::<Result<Vec<_>>>()?;
+    if recipe.layout == Layout::Oidn {
+        // What follows the first underscore is the kind of image there.
+        names.iter_mut().for_each(|name| *name = name.replace('_', "-"));
+    }
     let mut due = Vec::new();
     if let Some((_, name)) = names.iter().enumerate().find(|(k, name)| names[..*k].contains(name)) {
         bail!(Error::Usage(format!("two scenes would be the frame {name}: give their files other names")));

@@ -166,6 +166,8 @@ fn picture(path: &Path, image: &Image, number: Number) -> Result<()> {
         Number::Float32 => (Kind::Float, RGB.map(String::from).to_vec()),
         Number::Float16 => (Kind::Half, RGB.map(String::from).to_vec()),
     };
-    let (width, height, data) = (image.width, image.height, image.data.clone());
+    let (width, height) = (image.width, image.height);
+    let limit = if number == Number::Float16 { half::f16::MAX.to_f32() } else { f32::MAX };
+    let data = image.data.iter().map(|value| value.clamp(-limit, limit)).collect();
     write(path, &Pixels { width, height, channels, data, window: None, attributes: Vec::new() }, kind, Some("zip"))
 }

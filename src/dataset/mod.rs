@@ -43,6 +43,8 @@ pub struct Recipe {
     pub notes: bool,
     /// Statistics that are stored.
     pub layers: Needs,
+    /// Options that override what is in the scene files, as on the command line.
+    pub scene_options: String,
     /// Arrangement of the files.
     pub layout: Layout,
     /// Type of the numbers.
@@ -152,7 +154,7 @@ pub fn make(
 }
 
 /// Name of a method's channels: its text, with underscores for what is neither letter nor digit.
-fn column(method: &str) -> String {
+pub fn column(method: &str) -> String {
     method.replace(|c: char| !c.is_ascii_alphanumeric(), "_")
 }
 

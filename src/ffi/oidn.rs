@@ -57,18 +57,19 @@ pub fn check() -> Result<(), String> {
 }
 
 fn load() -> Result<Functions, String> {
-    let mut found = Err(MISSING.to_owned());
+    let mut unusable = None;
     for path in candidates() {
         // SAFETY: the library's own initialisation is run, which has no preconditions.
-        if let Ok(library) = unsafe { Library::new(&path) } {
-            let why = |error| format!("{} is no Open Image Denoise 2: {error}", Path::new(&path).display());
-            found = Functions::of(library).map_err(why);
-        }
-        if found.is_ok() {
-            break;
+        match unsafe { Library::new(&path) }.and_then(Functions::of) {
+            Ok(functions) => return Ok(functions),
+            Err(error) if Path::new(&path).exists() => {
+                let path = Path::new(&path).display();
+                unusable.get_or_insert(format!("{path} cannot be used as Open Image Denoise 2: {error}"));
+            }
+            Err(_) => {}
         }
     }
-    found
+    Err(unusable.unwrap_or_else(|| MISSING.to_owned()))
 }
 
 /// Names to try: in OIDN_DIR, on the loader's path, and in the wheel of the active virtual environment.
@@ -128,7 +129,13 @@ impl Device {
         // SAFETY: creating a device has no preconditions; null is checked for.
         let handle = unsafe { (functions.new_device)(DEVICE_TYPE_CPU) };
         if handle.is_null() {
-            return Err("no device: the library's device modules must lie beside it".into());
+            let mut message = std::ptr::null();
+            // SAFETY: without a device it is the error of the calling thread; the message is read before the next call.
+            let why = unsafe {
+                (functions.device_error)(handle, &mut message);
+                (!message.is_null()).then(|| CStr::from_ptr(message).to_string_lossy().into_owned())
+            };
+            return Err(why.unwrap_or_else(|| "no device: the library's device modules must lie beside it".into()));
         }
         let device = Self { handle, functions };
         // SAFETY: the device is valid and the names are null-terminated.

@@ -99,6 +99,11 @@ impl Convolution {
         Self { inputs, outputs, stride: 2, phases, bias: padded(bias), activation }
     }
 
+    /// Number of channels that go in.
+    pub fn inputs(&self) -> usize {
+        self.inputs
+    }
+
     /// Number of channels that come out.
     pub fn outputs(&self) -> usize {
         self.outputs

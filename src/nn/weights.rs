@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 
-use half::f16;
 use serde::Deserialize;
 
 use super::convolution::{Activation, Convolution};
@@ -80,12 +79,15 @@ impl Weights {
 }
 
 fn array(entry: &Entry, data: &[u8]) -> Result<Array, String> {
+    if entry.shape.contains(&0) {
+        return Err("without values".into());
+    }
     let [start, end] = entry.data_offsets;
     let bytes = data.get(start..end).ok_or("beyond its end")?;
     let count = entry.shape.iter().try_fold(1usize, |count, &length| count.checked_mul(length)).ok_or("of no size")?;
     let (size, read): (usize, fn(&[u8]) -> f32) = match entry.dtype.as_str() {
         "F32" => (4, |bytes| f32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]])),
-        "F16" => (2, |bytes| f16::from_le_bytes([bytes[0], bytes[1]]).to_f32()),
+        "F16" => (2, |bytes| half::f16::from_le_bytes([bytes[0], bytes[1]]).to_f32()),
         other => return Err(format!("of type {other}: single and half floats are read")),
     };
     if bytes.len() != count.saturating_mul(size) {

@@ -71,7 +71,8 @@ impl Graph {
         let mut graph = Self { first, edges, diagonal: Vec::new(), screen };
         let sum = |i: usize| graph.screen[i] + graph.edges(i).iter().map(|edge| edge.1).sum::<f32>();
         graph.diagonal = (0..nodes).into_par_iter().map(sum).collect();
-        // Without any screening the matrix is singular.
+        // Without any screening the matrix is singular. So it is where some nodes are screened and others, which no edges
+        // join to them, are not: nobody asks for that.
         if graph.screen.iter().all(|&screen| screen <= 0.0) {
             graph.screen = graph.diagonal.iter().map(|diagonal| LEAST_SCREEN * diagonal).collect();
         }

@@ -81,6 +81,9 @@ fn frames_are_kept_only_if_that_is_asked_for_and_the_settings_are_the_same() {
     };
     refused(&[], "keep it with --resume");
     refused(&["--resume", "--seed", "7"], "other settings");
+    refused(&["--resume", "--crop", "0,0,8x8"], "other settings");
+    refused(&["--method", "l2", "--method", "l2"], "names of another");
+    refused(&["--layout", "oidn", "--layers", "bins"], "albedo and normal only");
     refused(&[SCENE], "two scenes would be the frame occluder");
     refused(&["--method", "l3"], "`l3` is not known");
     std::fs::write(folder.path().join("occluder.json"), "{").unwrap();

@@ -65,6 +65,7 @@ fn damaged_files_are_refused_with_the_reason() {
         (VECTORS[..VECTORS.len() - 4].to_vec(), "beyond its end"),
         (changed("\"F32\"", "\"F64\""), "of type F64"),
         (changed("\"shape\"", "\"shade\""), "no sensible entry"),
+        (changed("[33,7,1,1]", "[33,0,1,1]"), "without values"),
         (not_finite, "not finite"),
     ] {
         let why = Weights::parse(&bytes).unwrap_err();

@@ -79,7 +79,7 @@ def prepare(frame, names):
     trust[-1] = 1
     frame.array = None
     return {"images": images, "features": features, "trust": trust, "target": planes(frame.target), "noise": noise,
-            "bias": bias, "spp": frame.spp, "name": frame.name, "frame": frame}
+            "bias": bias, "variance": variance, "spp": frame.spp, "name": frame.name, "frame": frame}
 
 
 def weights(logits, trust):
@@ -138,6 +138,8 @@ def train(options):
     torch.set_num_threads(options.threads)
     os.makedirs(options.run, exist_ok=True)
     training, apart = samples(options.frames, options.kind)
+    if not apart:
+        raise SystemExit("none of these scenes is kept apart for tests: those are numbers 90 to 99 of every hundred")
     net = network(len(CANDIDATES[options.kind]))
     optimiser = torch.optim.Adam(net.parameters(), RATE)
     schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, RATE, options.steps)
@@ -190,6 +192,7 @@ def test(options):
             kept = weights(net(sample["features"][None])[0], sample["trust"])
             image = (kept.unsqueeze(1) * sample["images"]).sum(0)
             claimed = (kept[:-1] * torch.maximum(sample["bias"][:-1], 0.02 * sample["noise"])).sum(0)
+            claimed += kept[-1] * sample["variance"][0]
         frame, last = sample["frame"], lambda planes: np.moveaxis(planes.numpy(), 0, -1)
         errors = [frame.rel_mse(last(sample["images"][k])) for k in range(len(names))] + [frame.rel_mse(last(image))]
         # The target's own noise, taken off on average, may be more than what is left.
@@ -199,7 +202,7 @@ def test(options):
         relative = 1 / sample["divisor"]
         calibration.append((float((true.mean(0) * relative[0]).mean()), float((claimed * relative[0]).mean())))
     print("| spp | frames | " + " | ".join(name or "colours" for name in names) + " | blend | over the best | worst |\n" + "|---" * (len(names) + 5) + "|")
-    good = True
+    good = bool(rows)
     for spp in sorted(rows):
         errors = np.array(rows[spp])
         means = np.exp(np.log(errors).mean(0))
@@ -208,7 +211,7 @@ def test(options):
         good &= ratio < 1
         print("| %d | %d | %s | %.2f | %.2f |" % (spp, len(errors), " | ".join("%.5f" % m for m in means), ratio, worst))
     true, claimed = np.array(calibration).T
-    print("claimed over true error: %.2f in the geometric mean" % np.exp(np.log(claimed / np.maximum(true, 1e-7)).mean()))
+    print("true over claimed error: %.2f in the geometric mean" % np.exp(np.log(np.maximum(true, 1e-7) / claimed).mean()))
     return good
 
 

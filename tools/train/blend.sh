@@ -1,6 +1,6 @@
 #!/bin/sh
 # Everything from nothing to the weights of `blend`: models, scenes, frames, training, gates. What is there is kept, so an
-# interrupted run goes on. Takes hours; FOLDER needs 10 GB.
+# interrupted run goes on. Takes hours; FOLDER, from the repository's top, needs 10 GB.
 #
 #     tools/train/blend.sh FOLDER [SCENES]
 set -eu

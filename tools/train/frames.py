@@ -55,7 +55,7 @@ class Frame:
 
 
 def load(folders):
-    """All frames of some folders, and for each its manifest's name, in the order of names and sample counts."""
+    """All frames of some folders, in the order of names and sample counts."""
     frames = []
     for folder in folders:
         for path in glob.glob(os.path.join(folder, "*.json")):

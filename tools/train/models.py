@@ -114,6 +114,8 @@ def convert(archive, row, folder):
 def main(folder):
     os.makedirs(f"{folder}/environments", exist_ok=True)
     with tempfile.TemporaryDirectory() as scratch:
+        # Package lists may be old or absent; downloading does not need to be root, updating them does.
+        subprocess.run(["apt-get", "update", "-qq"], check=False)
         for package in ("sweethome3d-furniture", "blender-data"):
             subprocess.run(["apt-get", "download", package], cwd=scratch, check=True)
         for package in os.listdir(scratch):

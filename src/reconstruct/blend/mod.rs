@@ -44,6 +44,10 @@ pub const METHOD: Method = Method {
 /// Bytes held for every pixel besides the frame while images are mixed, an upper bound.
 const BYTES: u64 = 900;
 
+/// The same while a method works: of its intermediate images, and of every finished candidate.
+const NOTES: u64 = 80;
+const CANDIDATE: u64 = 12;
+
 /// Methods, and those of their intermediate images that are candidates beside their own.
 type Candidates = &'static [(&'static str, &'static [&'static str])];
 
@@ -79,11 +83,19 @@ impl Reconstruction for Blend {
     fn reconstruct(&self, frame: &Frame, context: &Context) -> Result<Solution> {
         check_memory(frame, context, METHOD.id, BYTES)?;
         let inputs = Inputs::new(frame, 1)?;
+        // What is missing is said before the work.
+        if !frame.has_own_edges() {
+            frame.cross()?;
+        }
+        frame.require(Layer::Albedo)?;
+        let pixels = (frame.width * frame.height) as u64;
         let (mut candidates, mut error) = (Vec::new(), None);
         for (k, (method, notes)) in self.methods.iter().enumerate() {
             let share = 0.9 / self.methods.len() as f32;
             let report = |what: &str, done: f32| (context.progress)(what, (k as f32 + done) * share);
-            let solution = method.reconstruct(frame, &Context { progress: &report, notes: true, ..*context })?;
+            let held = pixels * (NOTES + CANDIDATE * candidates.len() as u64);
+            let memory = context.memory.map(|memory| memory.saturating_sub(held));
+            let solution = method.reconstruct(frame, &Context { progress: &report, memory, notes: true })?;
             candidates.push(solution.image);
             for name in *notes {
                 let note = solution.notes.iter().find(|note| note.name == *name);

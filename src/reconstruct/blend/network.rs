@@ -25,9 +25,15 @@ impl Network {
             weights.convolution(&format!("layer{k}"), dilation, activation)
         };
         let layers = DILATIONS.iter().enumerate().map(layer).collect::<Result<Vec<_>, _>>()?;
-        let outputs = layers.last().map(Convolution::outputs);
-        if outputs != Some(candidates) {
-            return Err(format!("the weights are for {outputs:?} images instead of {candidates}"));
+        let mut channels = 4 * candidates + 5;
+        for layer in &layers {
+            if layer.inputs() != channels {
+                return Err(format!("a layer takes {} channels instead of {channels}", layer.inputs()));
+            }
+            channels = layer.outputs();
+        }
+        if channels != candidates {
+            return Err(format!("the weights are for {channels} images instead of {candidates}"));
         }
         Ok(Self(layers))
     }
@@ -74,7 +80,7 @@ mod tests {
                     assert!((share - expected).abs() < 1e-5, "{share} instead of {expected} at {x},{y}");
                 }
             }
-            assert!(Network::new(weights, 2).err().unwrap().contains("instead of 2"));
+            assert!(Network::new(weights, 2).err().unwrap().contains("channels instead of 13"));
         }
     }
 }

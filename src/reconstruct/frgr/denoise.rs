@@ -59,10 +59,14 @@ pub fn denoise(
     }
 }
 
+/// Largest distance that counts: its square and sums of those are still floats.
+const MOST: f32 = 1e15;
+
 /// Squared error of an image, mean over the channels: its squared distances from the sampled colours less the noise of these,
-/// averaged over a window. Unbiased as far as the image's errors have nothing to do with the colours' noise; may be negative.
+/// averaged over a window. With the samples' variances it is unbiased as far as the image's errors have nothing to do with
+/// the colours' noise; the level's may have been raised, which makes it less. May be negative.
 fn residual_error(color: &Planes, variance: &Planes, image: &Planes) -> Planes {
-    let square = color.zip(image, |color, image| (color - image) * (color - image));
-    let excess = square.zip(variance, |square, variance| square - variance);
+    let square = color.zip(image, |color, image| (color - image).clamp(-MOST, MOST).powi(2));
+    let excess = square.zip(variance, |square, variance| square - variance.min(MOST * MOST));
     excess.sum().map(|sum| sum / 3.0).box_mean(RESIDUALS)
 }

@@ -115,7 +115,8 @@ struct Prepared {
 
 impl Reconstruction for Frgr {
     fn needs(&self) -> Needs {
-        Needs { features: !self.features.is_empty(), ..Needs::EDGES }
+        let features = !self.features.is_empty() || self.denoiser == Denoiser::Oidn;
+        Needs { features, ..Needs::EDGES }
     }
 
     fn estimates_error(&self) -> bool {
