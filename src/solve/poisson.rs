@@ -64,13 +64,14 @@ impl Weights {
     pub fn rhs(&self, targets: Targets) -> Vec<Quad> {
         let Targets { edges, data, differences } = targets;
         let value = |pixel: usize| {
-            let mut sum = data[pixel].map(|value| self.screen[pixel] * value);
+            // Rounded once: what strong edges round off moves whole regions that only weak screening holds.
+            let mut sum = data[pixel].map(|value| f64::from(self.screen[pixel]) * f64::from(value));
             for half in edges.around(pixel) {
                 // A difference towards this pixel adds to it.
-                let weight = -half.sign * self.edges[half.edge];
-                (0..4).for_each(|c| sum[c] += weight * differences[half.edge][c]);
+                let weight = f64::from(-half.sign * self.edges[half.edge]);
+                (0..4).for_each(|c| sum[c] += weight * f64::from(differences[half.edge][c]));
             }
-            sum
+            sum.map(|sum| sum as f32)
         };
         (0..data.len()).into_par_iter().map(value).collect()
     }
