@@ -64,12 +64,7 @@ impl Reference {
         if self.spp == 0 {
             return f64::INFINITY;
         }
-        let relative = |(&value, &difference): (&f32, &f32)| {
-            let (value, half) = (f64::from(value), f64::from(difference) / 2.0);
-            half * half / (value * value + 0.01)
-        };
-        let pairs = self.image.data.iter().zip(&self.difference.data);
-        pairs.map(relative).sum::<f64>() / self.image.data.len() as f64
+        floor(&self.image, &self.difference)
     }
 
     /// Renders the next wave, `spp` samples in each half. Nothing changes when `control.stop` ends it early; then
@@ -184,6 +179,15 @@ impl Reference {
             fingerprint: fingerprint.ok_or_else(|| lacks("fingerprint"))?,
         })
     }
+}
+
+/// Expected relMSE of the mean of two independent halves, from their difference.
+pub fn floor(image: &Image, difference: &Image) -> f64 {
+    let relative = |(&value, &difference): (&f32, &f32)| {
+        let (value, half) = (f64::from(value), f64::from(difference) / 2.0);
+        half * half / (value * value + 0.01)
+    };
+    image.data.iter().zip(&difference.data).map(relative).sum::<f64>() / image.data.len() as f64
 }
 
 fn not_one(path: &Path, why: &str) -> Error {

@@ -32,7 +32,7 @@ impl Case {
     /// Loads a scene, finds its reference and makes sure that it is one. `reference` is a file, a folder with files
     /// named after scenes, or none: then it lies beside the scene, or in a folder `references` beside the scene's.
     pub fn load(path: &Path, reference: Option<&Path>, size: Option<(usize, usize)>) -> Result<Self> {
-        let name = name(path);
+        let name = load::name(path);
         let file = find(path, &name, reference)?;
         let (truth, known) = truth(&file)?;
         let there = (truth.image.width, truth.image.height);
@@ -54,7 +54,7 @@ impl Case {
 impl Truth {
     /// The reference of a scene, as [`Case::load`] finds it, with the scene's name.
     pub fn of(path: &Path, reference: Option<&Path>) -> Result<(String, Self)> {
-        let name = name(path);
+        let name = load::name(path);
         let (truth, _) = truth(&find(path, &name, reference)?)?;
         Ok((name, truth))
     }
@@ -72,14 +72,6 @@ fn truth(path: &Path) -> Result<(Truth, Option<String>)> {
         return Err(Error::bad_data(path, format!("the value at pixel {x},{y} is not finite")));
     }
     Ok((Truth { image, floor: None }, None))
-}
-
-/// Name of a scene file.
-fn name(path: &Path) -> String {
-    let stem = path.file_stem().unwrap_or_default();
-    let folder = path.canonicalize().ok().and_then(|path| Some(path.parent()?.file_name()?.to_owned()));
-    let name = if stem == "scene" { folder.unwrap_or_else(|| stem.to_owned()) } else { stem.to_owned() };
-    name.to_string_lossy().into_owned()
 }
 
 fn find(path: &Path, name: &str, reference: Option<&Path>) -> Result<PathBuf> {

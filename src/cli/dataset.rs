@@ -1,6 +1,6 @@
 //! `fluxion dataset`.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::{Context as _, Result, bail};
@@ -8,6 +8,7 @@ use fluxion::dataset::{self, Layout, Number, Recipe};
 use fluxion::error::Error;
 use fluxion::film::{EdgeNeed, Needs};
 use fluxion::reconstruct;
+use fluxion::scene::load;
 
 use super::progress;
 use super::terminal::out;
@@ -106,7 +107,7 @@ impl Args {
             bail!(Error::Usage("--layout oidn has albedo and normal only: leave --layers and --notes out".into()));
         }
         let columns: Vec<_> = self.methods.iter().map(|method| dataset::column(method)).collect();
-        if let Some((k, _)) = columns.iter().enumerate().find(|(k, column)| columns[..*k].contains(column)) {
+        if let Some(k) = repeated(&columns) {
             bail!(Error::Usage(format!("--method {} would have the names of another one's images", self.methods[k])));
         }
         let layers = Needs {
@@ -138,14 +139,14 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let recipe = args.recipe()?;
     let folder = &args.output;
     std::fs::create_dir_all(folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
-    let mut names = args.scenes.iter().map(|path| name(path)).collect::<Result<Vec<_>>>()?;
+    let mut names: Vec<_> = args.scenes.iter().map(|path| load::name(path)).collect();
     if recipe.layout == Layout::Oidn {
         // What follows the first underscore is the kind of image there.
         names.iter_mut().for_each(|name| *name = name.replace('_', "-"));
     }
     let mut due = Vec::new();
-    if let Some((_, name)) = names.iter().enumerate().find(|(k, name)| names[..*k].contains(name)) {
-        bail!(Error::Usage(format!("two scenes would be the frame {name}: give their files other names")));
+    if let Some(k) = repeated(&names) {
+        bail!(Error::Usage(format!("two scenes would be the frame {}: give their files other names", names[k])));
     }
     for (k, name) in names.iter().enumerate() {
         let there = dataset::is_there(folder, name, &recipe)?;
@@ -155,7 +156,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         due.extend((!there).then_some(k));
     }
     let (stop, bar) = (super::interrupt::stop_on_signal()?, progress::bar(args.quiet));
-    let total = due.len() as f32;
+    let (mut there, total) = (names.len() - due.len(), due.len() as f32);
     for (done, &k) in due.iter().enumerate() {
         bar.set_message(names[k].clone());
         let report = |share| progress::set(&bar, (done as f32 + share) / total);
@@ -165,17 +166,14 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         if !dataset::make((&scene, &args.scenes[k]), frame, &recipe, &stop, &report)? {
             break;
         }
+        there += 1;
     }
     bar.finish_and_clear();
-    let there = names.iter().filter(|name| dataset::is_there(folder, name, &recipe).unwrap_or(false)).count();
     out!("{}: {there} of {} frames", folder.display(), names.len())?;
     Ok(ExitCode::SUCCESS)
 }
 
-/// Name of a scene's frame.
-fn name(path: &Path) -> Result<String> {
-    let file = path.file_stem().map(|name| name.to_string_lossy().into_owned());
-    let of_folder = || Some(path.canonicalize().ok()?.parent()?.file_name()?.to_string_lossy().into_owned());
-    let name = file.filter(|name| name != "scene").or_else(of_folder);
-    name.with_context(|| format!("{} is no scene file", path.display()))
+/// The first of some names that was there before.
+fn repeated(names: &[String]) -> Option<usize> {
+    (0..names.len()).find(|&k| names[..k].contains(&names[k]))
 }

@@ -50,15 +50,6 @@ impl Target {
         };
         Self { image: combine(|a, b| 0.5 * (a + b)), difference: combine(|a, b| a - b) }
     }
-
-    /// Expected relMSE of the target itself.
-    pub fn floor(&self) -> f64 {
-        let relative = |(&value, &difference): (&f32, &f32)| {
-            let (value, half) = (f64::from(value), f64::from(difference) / 2.0);
-            half * half / (value * value + 0.01)
-        };
-        self.image.data.iter().zip(&self.difference.data).map(relative).sum::<f64>() / self.image.data.len() as f64
-    }
 }
 
 const RGB: [&str; 3] = ["R", "G", "B"];

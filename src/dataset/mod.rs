@@ -24,7 +24,7 @@ use crate::film::Needs;
 use crate::math::rng;
 use crate::plan::Plan;
 use crate::reconstruct::{self, Context, Reconstruction};
-use crate::reference::fingerprint;
+use crate::reference::{fingerprint, floor};
 use crate::render::{Budget, Control, RenderOutcome, RenderSettings, render, resume};
 use crate::scene::Scene;
 
@@ -142,7 +142,7 @@ pub fn make(
         height: sensor.height,
         seed: seed.to_string(),
         target_seed: target_seed.to_string(),
-        floor: target.floor(),
+        floor: floor(&target.image, &target.difference),
         channels,
         version: env!("CARGO_PKG_VERSION").to_owned(),
         recipe: recipe.clone(),

@@ -114,6 +114,19 @@ impl Functions {
             _library: library,
         })
     }
+
+    /// Fails with the error that has happened since the last call, if any: of a device, or where it is null of this thread.
+    fn check(&self, device: Handle) -> Result<(), String> {
+        let mut message = std::ptr::null();
+        // SAFETY: the device is valid or null; the message is read before the next call.
+        unsafe {
+            if (self.device_error)(device, &mut message) == ERROR_NONE {
+                return Ok(());
+            }
+            let known = (!message.is_null()).then(|| CStr::from_ptr(message).to_string_lossy().into_owned());
+            Err(known.unwrap_or_else(|| "unknown error".into()))
+        }
+    }
 }
 
 /// A device of so many threads.
@@ -129,13 +142,8 @@ impl Device {
         // SAFETY: creating a device has no preconditions; null is checked for.
         let handle = unsafe { (functions.new_device)(DEVICE_TYPE_CPU) };
         if handle.is_null() {
-            let mut message = std::ptr::null();
-            // SAFETY: without a device it is the error of the calling thread; the message is read before the next call.
-            let why = unsafe {
-                (functions.device_error)(handle, &mut message);
-                (!message.is_null()).then(|| CStr::from_ptr(message).to_string_lossy().into_owned())
-            };
-            return Err(why.unwrap_or_else(|| "no device: the library's device modules must lie beside it".into()));
+            functions.check(handle)?;
+            return Err("no device: the library's device modules must lie beside it".into());
         }
         let device = Self { handle, functions };
         // SAFETY: the device is valid and the names are null-terminated.
@@ -188,17 +196,8 @@ impl Device {
         Ok(output)
     }
 
-    /// The error that has happened since the last call, if any.
     fn check(&self) -> Result<(), String> {
-        let mut message = std::ptr::null();
-        // SAFETY: the device is valid; the message is read before the next call.
-        unsafe {
-            if (self.functions.device_error)(self.handle, &mut message) == ERROR_NONE {
-                return Ok(());
-            }
-            let known = (!message.is_null()).then(|| CStr::from_ptr(message).to_string_lossy().into_owned());
-            Err(known.unwrap_or_else(|| "unknown error".into()))
-        }
+        self.functions.check(self.handle)
     }
 }
 

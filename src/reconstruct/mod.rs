@@ -18,6 +18,7 @@ mod oidn;
 mod parameters;
 mod primal;
 mod rdfc;
+mod residual;
 
 pub use self::parameters::Parameters;
 use crate::error::{Error, Result};

@@ -182,10 +182,8 @@ def trained(options):
     return net, state["step"]
 
 
-def test(options):
+def compared(net, names, apart):
     """Errors on the scenes kept apart, as a table: geometric means over those of the best single image. True if all are less."""
-    names, (net, _) = CANDIDATES[options.kind], trained(options)
-    _, apart = samples(options.frames, options.kind)
     rows, calibration = {}, []
     for sample in apart:
         with torch.no_grad():
@@ -215,14 +213,17 @@ def test(options):
     return good
 
 
+def test(options):
+    compared(trained(options)[0], CANDIDATES[options.kind], samples(options.frames, options.kind)[1])
+
+
 def export(options):
     """Writes half floats, and for the tests what the network makes of them on one crop."""
-    if not test(options):
+    (net, steps), (training, apart) = trained(options), samples(options.frames, options.kind)
+    if not compared(net, CANDIDATES[options.kind], apart):
         raise SystemExit("not exported: a single image is better")
-    net, steps = trained(options)
     net = net.half().float()
     top = os.path.join(os.path.dirname(__file__), "..", "..")
-    training, apart = samples(options.frames, options.kind)
     named = {f"layer{k}.{key}": value.half() for k, layer in enumerate(layer for layer in net if hasattr(layer, "weight"))
              for key, value in layer.state_dict().items()}
     recipe = {"candidates": CANDIDATES[options.kind], "images": len(training), "steps": steps, "batch": BATCH, "crop": CROP,

@@ -3,19 +3,18 @@
     python tools/train/check.py SCENE... [--spp 256]
 
 Prints for every scene the ratio of both images' means, its standard error, and the share of 8x8 blocks that differ by more than
-four of theirs. Needs PyPI mitsuba, openimageio and numpy, and DRJIT_LIBLLVM_PATH naming libLLVM.
+four of theirs. Run from the repository's top folder after `cargo build --release`. Needs PyPI mitsuba, openimageio and numpy, and
+DRJIT_LIBLLVM_PATH naming libLLVM.
 """
 import argparse
 import os
-import subprocess
 import sys
-import tempfile
 
 import mitsuba
 import numpy as np
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."))
-import exr
+import against_mitsuba
 
 SIZE, BLOCK, RUNS = 64, 8, 4
 
@@ -33,32 +32,19 @@ def runs(render, spp):
 
 
 def by_mitsuba(path):
-    scene = mitsuba.load_file(path)
-    film = scene.sensors()[0].film()
-    parameters = mitsuba.traverse(scene)
-    for key in parameters.keys():
-        if key.endswith("film.size"):
-            parameters[key] = [SIZE, SIZE]
-    parameters.update()
-    assert tuple(film.size()) == (SIZE, SIZE)
+    scene = against_mitsuba.mitsuba_scene(mitsuba, path, (SIZE, SIZE))
     return lambda seed, spp: np.array(mitsuba.render(scene, seed=seed, spp=spp))[..., :3]
 
 
-def by_fluxion(fluxion, path):
-    def render(seed, spp):
-        with tempfile.TemporaryDirectory() as folder:
-            image = os.path.join(folder, "o.exr")
-            subprocess.run([fluxion, "render", path, "-o", image, "--method", "primal", "--size", f"{SIZE}x{SIZE}", "--spp",
-                            str(spp), "--seed", str(seed), "-q"], check=True, stderr=subprocess.DEVNULL)
-            return exr.rgb(image)
-    return render
+def by_fluxion(path):
+    return lambda seed, spp: against_mitsuba.fluxion(path, (SIZE, SIZE), spp, "primal", seed)[0]
 
 
 def main(options):
     mitsuba.set_variant("llvm_ad_rgb")
     print("| scene | ratio of means | standard error | blocks beyond 4 |\n|---|---|---|---|")
     for path in options.scenes:
-        (a, va), (b, vb) = runs(by_fluxion(options.fluxion, path), options.spp), runs(by_mitsuba(path), options.spp)
+        (a, va), (b, vb) = runs(by_fluxion(path), options.spp), runs(by_mitsuba(path), options.spp)
         # Variances of few runs are rough: each block's is at least the mean one.
         deviation = np.sqrt(np.maximum(va + vb, (va + vb).mean()) + 1e-12)
         name = os.path.basename(os.path.dirname(path))
@@ -70,5 +56,4 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("scenes", nargs="+")
     parser.add_argument("--spp", type=int, default=256)
-    parser.add_argument("--fluxion", default="target/release/fluxion")
     main(parser.parse_args())

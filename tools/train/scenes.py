@@ -17,6 +17,8 @@ import tempfile
 
 import numpy as np
 
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."))
+import exr
 import meshes
 from materials import ODDS, OPAQUE, Palette, choose, log_uniform, number, rgb
 
@@ -291,7 +293,6 @@ def draw(seed, models_folder, models, folder):
 
 def complaint(fluxion, path):
     """What speaks against a scene, by a glance at it; None if nothing does."""
-    import exr
     with tempfile.TemporaryDirectory() as scratch:
         layers = os.path.join(scratch, "layers.exr")
         done = subprocess.run([fluxion, "render", path, "-o", os.path.join(scratch, "o.exr"), "--layers", layers, "--size",
@@ -340,5 +341,4 @@ if __name__ == "__main__":
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--count", type=int, default=1)
     parser.add_argument("--fluxion", default="target/release/fluxion")
-    sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."))
     main(parser.parse_args())

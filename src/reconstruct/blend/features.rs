@@ -6,10 +6,10 @@ use crate::film::Layer;
 use crate::image::planes::Planes;
 use crate::nn::Tensor;
 use crate::reconstruct::inputs::Inputs;
+use crate::reconstruct::residual::{mean, noise, squared_error, windowed};
 
-/// Radii of the windows that residuals are averaged over, by themselves and squared.
+/// Radius of the window that residuals are averaged over, by themselves.
 const RESIDUAL: usize = 3;
-const BIAS: usize = 7;
 
 /// Squared residuals beyond the noise may be this share of it before an image counts as biased; more where few samples, fewer
 /// than this number, say little about the noise.
@@ -21,9 +21,6 @@ const LEAST_ERROR: f32 = 0.02;
 
 /// True error over the claimed one, on frames that the network was not trained on.
 const CALIBRATION: f32 = 1.0;
-
-/// Largest distance that counts: its square and sums of those are still floats.
-const MOST: f32 = 1e15;
 
 /// Luminance below which differences count as absolute, in units of the typical luminance.
 const DARK: f32 = 0.1;
@@ -48,22 +45,15 @@ pub struct Evidence {
 impl Evidence {
     /// Evidence from candidates, of which the last one is the sampled colour.
     pub fn new(inputs: &Inputs, images: &[Planes], claimed: Option<Planes>) -> Result<Self> {
-        let mean = |planes: &Planes| planes.sum().map(|sum| sum / 3.0);
         let [color, variance] = inputs.color()?;
-        let variance = mean(&variance).map(|variance| variance.min(MOST * MOST));
-        let all = |of: &dyn Fn(&Planes) -> Planes| {
-            let mut planes = images.iter().map(of);
-            let first = planes.next().expect("there are candidates");
-            planes.fold(first, |all, next| all.and(&next))
-        };
-        let luminance = all(&mean);
+        let variance = noise(&variance);
+        let of_each = |of: &dyn Fn(usize) -> Planes| (1..images.len()).fold(of(0), |all: Planes, k| all.and(&of(k)));
+        let luminance = of_each(&|k| mean(&images[k]));
         let sampled = mean(&color);
-        let residual = all(&|image| sampled.zip(&mean(image), |sampled, own| sampled - own).box_mean(RESIDUAL));
-        let bias = all(&|image| {
-            let square = mean(&color.zip(image, |sampled, own| (sampled - own).clamp(-MOST, MOST).powi(2)));
-            square.zip(&variance, |square, variance| square - variance).box_mean(BIAS)
-        });
-        let noise = variance.box_mean(BIAS).map(|noise| noise.max(1e-9));
+        let residual =
+            of_each(&|k| sampled.zip(&luminance.part(k, 1), |sampled, own| sampled - own).box_mean(RESIDUAL));
+        let bias = of_each(&|k| squared_error(&color, &variance, &images[k]));
+        let noise = windowed(&variance).map(|noise| noise.max(1e-9));
         let residual_noise = variance.box_mean(RESIDUAL);
         let claimed = claimed.map_or_else(|| variance.clone(), |claimed| mean(&claimed));
         let albedo = mean(&inputs.planes(Layer::Albedo, 1.0)?);

@@ -7,10 +7,10 @@ use crate::film::{Frame, Layer};
 use crate::image::nl_means::rdfc::{self, Denoised};
 use crate::image::nl_means::{Guide, Guides};
 use crate::image::oidn;
-use crate::image::planes::Planes;
 use crate::reconstruct::features::Feature;
 use crate::reconstruct::inputs::Inputs;
 use crate::reconstruct::oidn::clean;
+use crate::reconstruct::residual::{noise, squared_error};
 
 /// A choice of the denoised image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,9 +33,6 @@ impl std::str::FromStr for Denoiser {
     }
 }
 
-/// Radius of the window that squared residuals are averaged over.
-const RESIDUALS: usize = 7;
-
 /// Denoises the colour without gradients, `rows` rows at a time where that is possible.
 pub fn denoise(
     denoiser: Denoiser,
@@ -54,19 +51,8 @@ pub fn denoise(
         }
         Denoiser::Oidn => {
             let image = inputs.mirrored(&clean(frame, true, frame.get(Layer::Direct))?, inputs.scale);
-            Ok(Denoised { error: residual_error(&level.color, &level.variance, &image), image })
+            // The level's variances may have been raised, which makes the error less.
+            Ok(Denoised { error: squared_error(&level.color, &noise(&level.variance), &image), image })
         }
     }
-}
-
-/// Largest distance that counts: its square and sums of those are still floats.
-const MOST: f32 = 1e15;
-
-/// Squared error of an image, mean over the channels: its squared distances from the sampled colours less the noise of these,
-/// averaged over a window. With the samples' variances it is unbiased as far as the image's errors have nothing to do with
-/// the colours' noise; the level's may have been raised, which makes it less. May be negative.
-fn residual_error(color: &Planes, variance: &Planes, image: &Planes) -> Planes {
-    let square = color.zip(image, |color, image| (color - image).clamp(-MOST, MOST).powi(2));
-    let excess = square.zip(variance, |square, variance| square - variance.min(MOST * MOST));
-    excess.sum().map(|sum| sum / 3.0).box_mean(RESIDUALS)
 }

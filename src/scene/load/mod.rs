@@ -75,6 +75,14 @@ pub struct Plugin<T: 'static> {
     pub make: fn(&Object, &mut Loader) -> Result<T>,
 }
 
+/// Name of a scene file for people: the file's own, or that of the folder around a `scene.xml`.
+pub fn name(path: &Path) -> String {
+    let stem = path.file_stem().unwrap_or_default();
+    let folder = path.canonicalize().ok().and_then(|path| Some(path.parent()?.file_name()?.to_owned()));
+    let name = if stem == "scene" { folder.unwrap_or_else(|| stem.to_owned()) } else { stem.to_owned() };
+    name.to_string_lossy().into_owned()
+}
+
 /// Loads a scene file with everything it refers to.
 pub fn load(path: &Path, options: &Options) -> Result<Scene> {
     build(path, xml::parse(path, None, &options.parameters, options.strict)?, options)

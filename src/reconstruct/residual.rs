@@ -1,0 +1,32 @@
+//! Errors of images by how far they are from the sampled colours.
+
+use crate::image::planes::Planes;
+
+/// Radius of the window that squared residuals are averaged over.
+const RADIUS: usize = 7;
+
+/// Largest distance that counts: its square and sums of those are still floats.
+const MOST: f32 = 1e15;
+
+/// Mean over the channels.
+pub fn mean(planes: &Planes) -> Planes {
+    planes.sum().map(|sum| sum / 3.0)
+}
+
+/// Variance of the colours, mean over the channels, no larger than the largest square that counts.
+pub fn noise(variance: &Planes) -> Planes {
+    mean(variance).map(|variance| variance.min(MOST * MOST))
+}
+
+/// Squared error of an image, mean over the channels: its squared distances from the sampled colours less their [`noise`], mean
+/// over a window. With the samples' variances it is unbiased as far as the image's errors have nothing to do with the
+/// colours' noise. May be negative.
+pub fn squared_error(color: &Planes, noise: &Planes, image: &Planes) -> Planes {
+    let square = mean(&color.zip(image, |color, image| (color - image).clamp(-MOST, MOST).powi(2)));
+    square.zip(noise, |square, noise| square - noise).box_mean(RADIUS)
+}
+
+/// Means over the window of [`squared_error`].
+pub fn windowed(planes: &Planes) -> Planes {
+    planes.box_mean(RADIUS)
+}
