@@ -6,7 +6,7 @@ PACKAGES = g++ pkg-config libclang-dev libembree-dev libopenimageio-dev
 TEST_PACKAGES = chromium
 SCENE = scenes/cornell-box/scene.xml
 
-.PHONY: demo test packages check licences memcheck train-blend
+.PHONY: demo test packages check licences memcheck train-net train-blend train-gradnet
 
 demo: packages
 	cargo build --release
@@ -41,11 +41,11 @@ memcheck: packages
 	RUSTFLAGS="--cfg baseline" cargo build --release --target-dir target/memcheck
 	tools/memcheck/run
 
-# The weights of `blend` from nothing, in training/: hours, resumable. Building and using Fluxion needs none of it.
-train-blend: packages
+# Weights of learned methods from nothing, in training/: hours, resumable. Building and using Fluxion needs none of it.
+train-net train-blend train-gradnet: packages
 	@sh .ci/packages python3-venv
 	cargo build --release
-	tools/train/blend.sh training
+	tools/train/train.sh $(@:train-%=%) training
 
 # Installs what is missing, through sudo when not root. Elsewhere than on Debian it says what is needed.
 packages:

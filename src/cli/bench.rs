@@ -58,9 +58,6 @@ pub struct Args {
     quiet: bool,
 }
 
-/// A share of the smallest error that a reference's own noise should stay below.
-const FLOOR_SHARE: f64 = 0.1;
-
 /// Runs everything, and writes the page.
 pub fn run(args: &Args) -> Result<ExitCode> {
     super::use_threads(args.threads)?;
@@ -105,7 +102,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     store.save()?;
     write_page(args, &store, &scenes, &budgets, baseline.as_ref())?;
     let summary = Summary::new(&store.results, "relmse");
-    out!("{}\nrelMSE within the largest budget:\n", table(&summary))?;
+    out!("{}\nrelMSE within the largest budget, without the references' own noise:\n", table(&summary))?;
     if let Some(largest) = budgets.iter().max_by(|a, b| a.amount().total_cmp(&b.amount())) {
         out!("{}", errors(&summary, &largest.to_string()).trim_end())?;
     }
@@ -184,7 +181,10 @@ fn reference(args: &Args) -> Option<&Path> {
 /// Fails if a budget is not enough for a single sample of path tracing.
 fn check(case: &Case, budgets: &[Budget]) -> Result<()> {
     if case.truth.floor.is_none() {
-        note!("warning: the reference of {} does not say what scene it is of, nor how noisy it is", case.name);
+        note!(
+            "warning: the reference of {0} does not say how noisy it is, nor does a file {0}_var.exr beside it",
+            case.name
+        );
     }
     let least = budgets.iter().filter_map(|budget| match budget {
         Budget::Seconds(seconds) => Some(*seconds),
@@ -237,21 +237,20 @@ fn write_page(
     Ok(store.write("index.html", &page.html()?)?)
 }
 
-/// Says which references are too noisy for the errors that were measured by them.
+/// Says which references have more noise than the errors that were measured by them.
 fn warn_of_floors(results: &Results) {
     let mut scenes: Vec<&str> = results.records.iter().map(|record| record.scene.as_str()).collect();
     scenes.sort_unstable();
     scenes.dedup();
     for scene in scenes {
         let own = results.records.iter().filter(|record| record.scene == scene);
-        let errors = own.clone().filter_map(|record| record.metrics.get("relmse").copied());
-        let least = errors.fold(f64::INFINITY, f64::min);
+        let least = own.clone().filter_map(|record| record.error("relmse")).fold(f64::INFINITY, f64::min);
         let floor = own.filter_map(|record| record.floor).next().unwrap_or(0.0);
-        if floor > FLOOR_SHARE * least {
+        if floor > least {
             note!(
-                "warning: the reference of {scene} has a relMSE of {floor:.1e} itself, {:.0} % of the smallest error; \
-                 `fluxion reference` can continue it",
-                100.0 * floor / least
+                "warning: the reference of {scene} has a relMSE of {floor:.1e} itself, which was taken off: {:.0} times the \
+                 smallest error, {least:.1e}; `fluxion reference` can continue it",
+                floor / least
             );
         }
     }

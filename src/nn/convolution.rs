@@ -1,4 +1,4 @@
-//! Convolutions. Zeros surround the input, so that outputs are as large as inputs, or twice as large.
+//! Convolutions. Zeros surround the input, so that outputs are as large as inputs, or half or twice as large.
 
 use rayon::prelude::*;
 
@@ -14,11 +14,13 @@ pub enum Activation {
     Leaky(f32),
 }
 
-/// A convolution of 3x3 or 1x1 pixels (then it is a dense layer for every pixel), or one that doubles the size.
+/// A convolution of 3x3 or 1x1 pixels (then it is a dense layer for every pixel), or one that halves or doubles the size.
 #[derive(Clone, Debug)]
 pub struct Convolution {
     inputs: usize,
     outputs: usize,
+    /// Input pixels from one output pixel to the next along each axis, 1 or 2.
+    step: usize,
     /// Output pixels for every input pixel along each axis, 1 or 2.
     stride: usize,
     /// For each of the stride² output pixels: its taps.
@@ -72,7 +74,7 @@ impl Convolution {
         let taps: Vec<_> = (0..size * size).map(|tap| (offset(tap % size), offset(tap / size))).collect();
         let weight = |tap, input, output| weights[(output * inputs + input) * size * size + tap];
         let phases = vec![Phase::new(taps, (inputs, outputs), weight)];
-        Self { inputs, outputs, stride: 1, phases, bias: padded(bias), activation }
+        Self { inputs, outputs, step: 1, stride: 1, phases, bias: padded(bias), activation }
     }
 
     /// A transposed convolution of 4x4 pixels and stride 2, which doubles the size. Weights are indexed by input, output, row
@@ -96,7 +98,13 @@ impl Convolution {
             })
         };
         let phases = (0..4).map(phase).collect();
-        Self { inputs, outputs, stride: 2, phases, bias: padded(bias), activation }
+        Self { inputs, outputs, step: 1, stride: 2, phases, bias: padded(bias), activation }
+    }
+
+    /// The same at every second column and row only, which halves the size: what PyTorch has with a stride of 2.
+    pub fn halving(self) -> Self {
+        assert_eq!((self.step, self.stride), (1, 1), "a convolution that keeps the size");
+        Self { step: 2, ..self }
     }
 
     /// Number of channels that go in.
@@ -111,7 +119,7 @@ impl Convolution {
 
     /// The convolution of a tensor.
     pub fn apply(&self, input: &Tensor) -> Tensor {
-        let (width, height) = (input.width * self.stride, input.height * self.stride);
+        let (width, height) = self.size(input);
         let mut output = Tensor::new(width, height, self.outputs);
         self.apply_into(input, &mut output, 0);
         output
@@ -120,19 +128,19 @@ impl Convolution {
     /// The same into the channels of `output` from `first` on, as parts of what is to be concatenated.
     pub fn apply_into(&self, input: &Tensor, output: &mut Tensor, first: usize) {
         assert_eq!(input.channels, self.inputs, "as many channels as the convolution takes");
-        assert_eq!((output.width, output.height), (input.width * self.stride, input.height * self.stride));
+        assert_eq!((output.width, output.height), self.size(input));
         assert!(first + self.outputs <= output.channels);
         let wide = has_wide_registers();
         let (channels, border) = (output.channels, self.border());
         let rows = output.rows_mut().chunks(self.stride);
         rows.enumerate().for_each_init(Vec::new, |window, (y, rows)| {
-            window_of(window, input, y as isize, border);
+            window_of(window, input, (y * self.step) as isize, border);
             let window = Window { values: window, width: input.width + 2 * border, border, channels: self.inputs };
             for (row_phase, (_, row)) in rows.into_iter().enumerate() {
                 for column_phase in 0..self.stride {
                     let phase = &self.phases[row_phase * self.stride + column_phase];
                     let target = &mut row[column_phase * channels + first..];
-                    let columns = Columns { step: self.stride * channels, width: input.width };
+                    let columns = Columns { step: self.stride * channels, width: input.width / self.step };
                     // As many sums as registers have room for.
                     if wide {
                         self.row::<12>(phase, &window, target, columns)
@@ -142,6 +150,12 @@ impl Convolution {
                 }
             }
         });
+    }
+
+    /// Columns and rows of the output.
+    fn size(&self, input: &Tensor) -> (usize, usize) {
+        assert!(input.width.is_multiple_of(self.step) && input.height.is_multiple_of(self.step), "sides can be halved");
+        (input.width / self.step * self.stride, input.height / self.step * self.stride)
     }
 
     /// Rows and columns that taps reach beyond a pixel.
@@ -157,7 +171,7 @@ impl Convolution {
         for (packet, weights) in packets.enumerate() {
             let outputs = LANES.min(self.outputs - packet * LANES);
             let bias = Lanes::load(&self.bias[packet * LANES..]);
-            let sums = Sums { weights, starts: &starts, inputs: self.inputs, bias };
+            let sums = Sums { weights, starts: &starts, inputs: self.inputs, step: self.step, bias };
             let mut x = 0;
             while x < columns.width {
                 let mut put = |p: usize, sum: Lanes| {
@@ -219,6 +233,7 @@ struct Sums<'a> {
     weights: &'a [f32],
     starts: &'a [usize],
     inputs: usize,
+    step: usize,
     bias: Lanes,
 }
 
@@ -226,7 +241,8 @@ impl Sums<'_> {
     /// The sums of P pixels from column `x` on, always in the same order of their terms.
     fn of<const P: usize>(&self, window: &[f32], x: usize) -> [Lanes; P] {
         let mut sums = [self.bias; P];
-        accumulate(&mut sums, window, self.weights, self.starts, (x * self.inputs, self.inputs));
+        let pixel = self.step * self.inputs;
+        accumulate(&mut sums, window, self.weights, self.starts, (x * pixel, pixel, self.inputs));
         sums
     }
 }
@@ -240,15 +256,15 @@ fn accumulate<const P: usize>(
     window: &[f32],
     weights: &[f32],
     starts: &[usize],
-    (offset, inputs): (usize, usize),
+    (offset, pixel, inputs): (usize, usize, usize),
 ) {
     let mut total = *sums;
     for (start, weights) in starts.iter().zip(weights.chunks_exact(inputs * LANES)) {
-        let values = &window[start + offset..][..P * inputs];
+        let values = &window[start + offset..][..(P - 1) * pixel + inputs];
         for (input, weights) in weights.chunks_exact(LANES).enumerate() {
             let weights = Lanes::load(weights);
             for (p, sum) in total.iter_mut().enumerate() {
-                *sum += Lanes::splat(values[p * inputs + input]) * weights;
+                *sum += Lanes::splat(values[p * pixel + input]) * weights;
             }
         }
     }

@@ -7,8 +7,10 @@
 pub mod convolution;
 pub mod resample;
 pub mod tensor;
+pub mod unet;
 pub mod weights;
 
 pub use self::convolution::{Activation, Convolution};
 pub use self::tensor::Tensor;
+pub use self::unet::UNet;
 pub use self::weights::Weights;

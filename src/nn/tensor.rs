@@ -59,6 +59,16 @@ impl Tensor {
         Self { height: rows, data: self.data[first * length..][..rows * length].to_vec(), ..*self }
     }
 
+    /// The first channels, and the others.
+    pub fn split(&self, first: usize) -> (Self, Self) {
+        let part = |from: usize, count: usize| {
+            Self::from_fn(self.width, self.height, count, |x, y, pixel| {
+                pixel.copy_from_slice(&self.pixel(x, y)[from..from + count]);
+            })
+        };
+        (part(0, first), part(first, self.channels - first))
+    }
+
     /// The channels of tensors of the same size after each other.
     pub fn concat(parts: &[&Self]) -> Self {
         let (width, height) = (parts[0].width, parts[0].height);

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde::Deserialize;
 
 use super::convolution::{Activation, Convolution};
+use super::tensor::Tensor;
 
 /// Named arrays.
 #[derive(Debug, Default)]
@@ -64,9 +65,11 @@ impl Weights {
         }
     }
 
-    /// Shape and values of an array.
-    pub fn array(&self, name: &str) -> Option<(&[usize], &[f32])> {
-        self.0.get(name).map(|array| (array.shape.as_slice(), array.values.as_slice()))
+    /// An array of height, width and channels.
+    pub fn tensor(&self, name: &str) -> Option<Tensor> {
+        let array = self.0.get(name)?;
+        let [height, width, channels] = array.shape[..] else { return None };
+        Some(Tensor { width, height, channels, data: array.values.clone() })
     }
 
     fn pair(&self, name: &str) -> Result<(&Array, &Array), String> {

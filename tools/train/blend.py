@@ -10,34 +10,32 @@ writes src/reconstruct/blend/NAME.safetensors if the gates hold: on the scenes k
 image at every sample count. Features and safety rule are those of src/reconstruct/blend/.
 """
 import argparse
-import csv
 import json
 import os
-import time
 
 import numpy as np
 import torch
 from safetensors.torch import save_file
 from torch import nn
-from torch.nn import functional as F
 
 import frames
+import net
+import residual
+import runs
 
 # Images; the last, the sampled colours, takes what the safety rule leaves.
-CANDIDATES = {"own": ["frgr", "frgr_denoised", "frgr_level0_enhanced", ""],
-              "oidn": ["frgr_denoiser_oidn", "frgr_denoiser_oidn_denoised", "frgr_denoiser_oidn_level0_enhanced", "frgr", ""]}
+CANDIDATES = {"own": ["net", "frgr", "frgr_denoised", "frgr_level0_enhanced", ""],
+              "oidn": ["frgr_denoiser_oidn", "frgr_denoiser_oidn_denoised", "frgr_denoiser_oidn_level0_enhanced", "net", "frgr", ""]}
 WIDTH, SLOPE = 24, 0.01
-# Squared residuals beyond the noise may be this share of it before an image counts as biased; more where few samples, fewer
-# than this number, say little about the noise.
-TRUST, FEW = 0.5, 16
-RESIDUAL, BIAS = 3, 7
+# Radius of the window that residuals are averaged over, by themselves.
+RESIDUAL = 3
 CROP, BATCH, RATE, STEPS = 64, 8, 2e-3, 4000
 EPSILON = 0.03
 # Errors that are good enough.
 FLOOR = 2e-4
 
 
-def network(candidates):
+def weigher(candidates):
     inputs = 4 * candidates + 5
     layers = [nn.Conv2d(inputs, WIDTH, 3, padding=1), nn.LeakyReLU(SLOPE),
               nn.Conv2d(WIDTH, WIDTH, 3, padding=2, dilation=2), nn.LeakyReLU(SLOPE),
@@ -50,32 +48,30 @@ def network(candidates):
     return nn.Sequential(*layers)
 
 
-def box(image, radius):
-    """Means over windows, mirrored beyond the border without repeating it."""
-    padded = F.pad(image[None], (radius,) * 4, mode="reflect")
-    return F.avg_pool2d(padded, 2 * radius + 1, 1)[0]
+def planes(array):
+    return torch.from_numpy(np.ascontiguousarray(np.moveaxis(array, -1, 0)))
 
 
-def prepare(frame, names):
-    """Images (candidates, 3, height, width), features, trust of each image, target and what its errors are divided by."""
-    planes = lambda array: torch.from_numpy(np.ascontiguousarray(np.moveaxis(array, -1, 0)))
-    colour, sigma = planes(frame.radiance("")), planes(frame.radiance("sigma"))
-    images = torch.stack([planes(frame.image(name)) for name in names])
-    luminance, variance = images.mean(1), (sigma ** 2).mean(0, keepdim=True)
-    noise = box(variance, BIAS).clamp(min=1e-9)
+def prepare(frame, names, network):
+    """Images (candidates, 3, height, width), features, trust of each image and target; `network` is that of the method net."""
+    colour, variance = planes(frame.radiance("")), net.variance_of(frame)
+    given = torch.stack([planes(frame.image(name)) for name in net.IMAGES])
+    corrected = net.solved(network, net.features(frame, given), given, variance, frame.spp)
+    images = torch.stack([corrected if name == "net" else planes(frame.image(name)) for name in names])
+    luminance = images.mean(1)
+    noise = residual.box(variance, residual.RADIUS).clamp(min=residual.LEAST_NOISE)
     middle = luminance.mean(0, keepdim=True).clamp(min=0)
     unit = middle + 0.1
-    residual = box(colour.mean(0, keepdim=True) - luminance, RESIDUAL)
-    deviation = (box(variance, RESIDUAL) / (2 * RESIDUAL + 1) ** 2 + 1e-9).sqrt()
-    bias = box(((images - colour) ** 2).mean(1) - variance, BIAS)
-    claimed = planes(frame.radiance("frgr_sigma")) ** 2 - planes(frame.radiance("direct_sigma")) ** 2
-    claimed = claimed.clamp(min=0).mean(0, keepdim=True)
+    apart = residual.box(colour.mean(0, keepdim=True) - luminance, RESIDUAL)
+    deviation = (residual.box(variance, RESIDUAL) / (2 * RESIDUAL + 1) ** 2 + 1e-9).sqrt()
+    bias = torch.cat([residual.squared_error(colour, variance, image) for image in images])
+    claimed = residual.estimated_error(colour, variance, corrected)
     features = torch.cat([
-        torch.asinh(3 * (luminance - middle) / unit), torch.asinh(3 * residual / unit), torch.asinh(residual / deviation),
+        torch.asinh(3 * (luminance - middle) / unit), torch.asinh(3 * apart / unit), torch.asinh(apart / deviation),
         torch.asinh(bias / noise),
         0.5 * torch.log(variance + 1e-7) - torch.log(unit), torch.log(unit), 0.5 * torch.log(claimed + 1e-7) - torch.log(unit),
         planes(frame.get("albedo", "RGB")).mean(0, keepdim=True), torch.full_like(unit, np.log2(frame.spp) / 4)])
-    trust = (TRUST * (1 + FEW / frame.spp) * noise / bias.clamp(min=1e-12)).clamp(max=1)
+    trust = residual.trust(noise, bias, frame.spp)
     trust[-1] = 1
     frame.array = None
     return {"images": images, "features": features, "trust": trust, "target": planes(frame.target), "noise": noise,
@@ -88,29 +84,27 @@ def weights(logits, trust):
     return torch.cat([kept[..., :-1, :, :], 1 - kept[..., :-1, :, :].sum(-3, keepdim=True)], -3)
 
 
-def blended(net, sample):
+def blended(weigh, sample):
     """The image, channels first, of a sample or a batch."""
     batched = sample["features"].dim() == 4
     features = sample["features"] if batched else sample["features"][None]
-    made = net(features)
+    made = weigh(features)
     kept = weights(made if batched else made[0], sample["trust"])
     return (kept.unsqueeze(-3) * sample["images"]).sum(-4)
 
 
 def samples(folders, kind):
     """Training samples and those of the scenes kept apart."""
-    everything = frames.load(folders)
+    everything, network = frames.load(folders), net.shipped()
     last = {frame.name: frame for frame in everything}
     made = []
     clean = {name: frame.image("frgr").mean(-1) / frame.scale for name, frame in last.items()}
     for frame in everything:
-        sample = prepare(frame, CANDIDATES[kind])
+        sample = prepare(frame, CANDIDATES[kind], network)
         # What errors are divided by comes from other samples than the target's: noise in it would darken the image.
         sample["divisor"] = torch.from_numpy(clean[frame.name] * frame.scale)[None] ** 2 + EPSILON
         made.append(sample)
-    # Ten scenes of every hundred.
-    apart = lambda sample: int(sample["name"]) // 10 % 10 == 9
-    return [s for s in made if not apart(s)], [s for s in made if apart(s)]
+    return [s for s in made if not runs.is_apart(s["name"])], [s for s in made if runs.is_apart(s["name"])]
 
 
 def crops(data, rng):
@@ -127,69 +121,46 @@ def crops(data, rng):
     return {key: torch.stack(parts) for key, parts in batch.items()}
 
 
-def loss(net, batch):
+def loss(weigh, batch):
     """Geometric mean of the relMSE of crops over that of the best candidate: no crop owns the gradient."""
     error = lambda image: ((image - batch["target"]) ** 2 / batch["divisor"]).mean((-3, -2, -1)) + FLOOR
     best = torch.stack([error(batch["images"][:, k]) for k in range(batch["images"].shape[1])]).amin(0)
-    return (error(blended(net, batch)) / best).log().mean()
+    return (error(blended(weigh, batch)) / best).log().mean()
 
 
 def train(options):
-    torch.set_num_threads(options.threads)
-    os.makedirs(options.run, exist_ok=True)
     training, apart = samples(options.frames, options.kind)
     if not apart:
         raise SystemExit("none of these scenes is kept apart for tests: those are numbers 90 to 99 of every hundred")
-    net = network(len(CANDIDATES[options.kind]))
-    optimiser = torch.optim.Adam(net.parameters(), RATE)
+    print(f"{len(training)} images to train on, {len(apart)} apart", flush=True)
+    torch.manual_seed(options.seed)
+    weigh = weigher(len(CANDIDATES[options.kind]))
+    optimiser = torch.optim.Adam(weigh.parameters(), RATE)
     schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, RATE, options.steps)
-    state_path, step = os.path.join(options.run, "state.pt"), 0
-    if os.path.exists(state_path):
-        state = torch.load(state_path)
-        net.load_state_dict(state["net"])
-        optimiser.load_state_dict(state["optimiser"])
-        schedule.load_state_dict(state["schedule"])
-        step = state["step"]
-    print(f"{len(training)} images to train on, {len(apart)} apart; from step {step}", flush=True)
-    with open(os.path.join(options.run, "log.csv"), "a", newline="") as file:
-        log, saved, mean = csv.writer(file), time.time(), 0.0
-        while step < options.steps:
-            # A step draws the same crops whenever it is taken.
-            rng = np.random.default_rng([options.seed, step])
-            value = loss(net, crops(training, rng))
-            optimiser.zero_grad()
-            value.backward()
-            optimiser.step()
-            schedule.step()
-            step += 1
-            mean += 0.01 * (float(value.detach()) - mean)
-            if step % 200 == 0:
-                log.writerow([step, "%.5f" % mean])
-                file.flush()
-                print(step, "%.4f" % mean, flush=True)
-            if time.time() - saved > 60 or step == options.steps:
-                state = {"net": net.state_dict(), "optimiser": optimiser.state_dict(), "schedule": schedule.state_dict(),
-                         "step": step}
-                torch.save(state, state_path + ".part")
-                os.replace(state_path + ".part", state_path)
-                saved = time.time()
+
+    def step_of(rng, _):
+        value = loss(weigh, crops(training, rng))
+        optimiser.zero_grad()
+        value.backward()
+        optimiser.step()
+        schedule.step()
+        return float(value.detach())
+
+    runs.train({"net": weigh, "optimiser": optimiser, "schedule": schedule}, step_of, options)
 
 
 def trained(options):
-    net = network(len(CANDIDATES[options.kind]))
-    state = torch.load(os.path.join(options.run, "state.pt"))
-    net.load_state_dict(state["net"])
-    return net, state["step"]
+    return runs.trained(weigher(len(CANDIDATES[options.kind])), options)
 
 
-def compared(net, names, apart):
+def compared(weigh, names, apart):
     """Errors on the scenes kept apart, as a table: geometric means over those of the best single image. True if all are less."""
     rows, calibration = {}, []
     for sample in apart:
         with torch.no_grad():
-            kept = weights(net(sample["features"][None])[0], sample["trust"])
+            kept = weights(weigh(sample["features"][None])[0], sample["trust"])
             image = (kept.unsqueeze(1) * sample["images"]).sum(0)
-            claimed = (kept[:-1] * torch.maximum(sample["bias"][:-1], 0.02 * sample["noise"])).sum(0)
+            claimed = (kept[:-1] * torch.maximum(sample["bias"][:-1], residual.LEAST_ERROR * sample["noise"])).sum(0)
             claimed += kept[-1] * sample["variance"][0]
         frame, last = sample["frame"], lambda planes: np.moveaxis(planes.numpy(), 0, -1)
         errors = [frame.rel_mse(last(sample["images"][k])) for k in range(len(names))] + [frame.rel_mse(last(image))]
@@ -219,12 +190,12 @@ def test(options):
 
 def export(options):
     """Writes half floats, and for the tests what the network makes of them on one crop."""
-    (net, steps), (training, apart) = trained(options), samples(options.frames, options.kind)
-    if not compared(net, CANDIDATES[options.kind], apart):
+    (weigh, steps), (training, apart) = trained(options), samples(options.frames, options.kind)
+    if not compared(weigh, CANDIDATES[options.kind], apart):
         raise SystemExit("not exported: a single image is better")
-    net = net.half().float()
+    weigh = weigh.half().float()
     top = os.path.join(os.path.dirname(__file__), "..", "..")
-    named = {f"layer{k}.{key}": value.half() for k, layer in enumerate(layer for layer in net if hasattr(layer, "weight"))
+    named = {f"layer{k}.{key}": value.half() for k, layer in enumerate(layer for layer in weigh if hasattr(layer, "weight"))
              for key, value in layer.state_dict().items()}
     recipe = {"candidates": CANDIDATES[options.kind], "images": len(training), "steps": steps, "batch": BATCH, "crop": CROP,
               "rate": RATE, "seed": options.seed}
@@ -232,7 +203,7 @@ def export(options):
               {"recipe": json.dumps(recipe)})
     given = apart[0]["features"][None, :, :12, :15]
     with torch.no_grad():
-        made = torch.softmax(net(given), 1)
+        made = torch.softmax(weigh(given), 1)
     vectors = {name: planes[0].permute(1, 2, 0).contiguous() for name, planes in (("input", given), ("output", made))}
     save_file(vectors, os.path.join(top, "tests/data", f"blend-{options.kind}.safetensors"))
 
@@ -241,10 +212,6 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("action", choices=["train", "test", "export"])
     parser.add_argument("kind", choices=list(CANDIDATES))
-    parser.add_argument("frames", nargs="+")
-    parser.add_argument("--run", required=True)
-    parser.add_argument("--steps", type=int, default=STEPS)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--threads", type=int, default=2)
+    runs.arguments(parser, STEPS)
     options = parser.parse_args()
     {"train": train, "test": test, "export": export}[options.action](options)

@@ -54,12 +54,18 @@ class Frame:
         return float((error * scale ** 2 / ((whole * scale) ** 2 + EPSILON)).mean())
 
 
+def manifest(folder, name):
+    with open(os.path.join(folder, name + ".json")) as file:
+        return json.load(file)
+
+
+def names(folder):
+    """Names of the frames in a folder, with their sample counts."""
+    found = sorted(os.path.basename(path)[:-5] for path in glob.glob(os.path.join(folder, "*.json")))
+    return [(name, manifest(folder, name)["recipe"]["spp"]) for name in found]
+
+
 def load(folders):
     """All frames of some folders, in the order of names and sample counts."""
-    frames = []
-    for folder in folders:
-        for path in glob.glob(os.path.join(folder, "*.json")):
-            with open(path) as file:
-                manifest = json.load(file)
-            frames += [Frame(folder, manifest, spp) for spp in manifest["recipe"]["spp"]]
-    return sorted(frames, key=lambda frame: (frame.name, frame.spp))
+    made = [Frame(folder, manifest(folder, name), spp) for folder in folders for name, spps in names(folder) for spp in spps]
+    return sorted(made, key=lambda frame: (frame.name, frame.spp))

@@ -1,10 +1,10 @@
-"""Errors of blends beside their candidates on scenes that they were not trained on.
+"""Errors of learned methods beside what they are made of on scenes that they were not trained on.
 
     python tools/train/gates.py SCENES REFERENCES NAME... [--spp 4,16,64] [--seeds 3]
 
 SCENES is a folder with NAME/scene.xml; REFERENCES one with NAME.exr (mean) and NAME_var.exr (variance of the mean). Prints
-relMSE, the references' noise taken off, means of the seeds, as ratios to frgr; fails if a blend is above 1.1 of the best
-method on a scene. Needs PyPI numpy, openimageio and, active, pyoidn.
+relMSE, the references' noise taken off, means of the seeds, as ratios to frgr; fails if one is above 1.1 of the best
+of those on a scene. Needs PyPI numpy, openimageio and, active, pyoidn.
 """
 import argparse
 import os
@@ -17,9 +17,9 @@ import numpy as np
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."))
 import exr
 
-# What each blend must not lose to.
-BLENDS = {"blend": ["frgr"], "blend:oidn=on": ["frgr", "oidn", "frgr:denoiser=oidn"]}
-METHODS = ["frgr", "oidn", "frgr:denoiser=oidn", "blend", "blend:oidn=on"]
+# What each learned method must not lose to.
+LEARNED = {"net": ["frgr"], "blend:oidn=on": ["frgr", "net", "oidn", "frgr:denoiser=oidn"]}
+METHODS = ["frgr", "oidn", "frgr:denoiser=oidn", "net", "blend:oidn=on"]
 
 
 def errors(options, name, spp):
@@ -50,13 +50,13 @@ def main(options):
             found = errors(options, name, spp)
             ratios.append([found[method] / found["frgr"] for method in METHODS])
             print(f"| {name} | {found['frgr']:.2e} | " + " | ".join("%.2f" % r for r in ratios[-1][1:]) + " |", flush=True)
-            for blend, others in BLENDS.items():
-                if found[blend] > 1.1 * min(found[other] for other in others):
-                    failed.append(f"{blend} on {name} at {spp} spp")
+            for learned, others in LEARNED.items():
+                if found[learned] > 1.1 * min(found[other] for other in others):
+                    failed.append(f"{learned} on {name} at {spp} spp")
         means = np.exp(np.log(np.array(ratios)).mean(0))
         print("| geometric mean | 1 | " + " | ".join("%.2f" % mean for mean in means[1:]) + " |", flush=True)
     if failed:
-        sys.exit("above a candidate: " + ", ".join(failed))
+        sys.exit("above one of these: " + ", ".join(failed))
 
 
 if __name__ == "__main__":

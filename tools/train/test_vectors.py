@@ -17,6 +17,7 @@ def main(path):
         "conv3": nn.Conv2d(5, 19, 3, padding=1),
         "dilated": nn.Conv2d(16, 16, 3, padding=3, dilation=3),
         "dense": nn.Conv2d(7, 33, 1),
+        "halve": nn.Conv2d(5, 19, 3, stride=2, padding=1),
         "double": nn.ConvTranspose2d(6, 17, 4, stride=2, padding=1),
         "pool": nn.MaxPool2d(2),
         "nearest": nn.Upsample(scale_factor=2, mode="nearest"),
@@ -25,7 +26,7 @@ def main(path):
     saved = {}
     for name, layer in layers.items():
         inputs = getattr(layer, "in_channels", 3)
-        size = (8, 6) if name == "pool" else (9, 15)
+        size = (8, 6) if name in ("pool", "halve") else (9, 15)
         given = torch.randn(1, inputs, *size)
         with torch.no_grad():
             made = layer(given)

@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use anyhow::Result;
-use fluxion::adaptive::{self, AdaptiveOutcome, AdaptiveSettings, Limits, Start};
+use fluxion::adaptive::{self, ALLOCATORS, AdaptiveOutcome, AdaptiveSettings, Limits, Start};
 use fluxion::film::{Frame, Needs, Provenance, exr};
 use fluxion::image::io::{DataWindow, failed_lookups};
 use fluxion::reconstruct::{Reconstruction, Solution};
@@ -38,10 +38,9 @@ impl Job<'_> {
     /// Renders, reconstructs and writes.
     pub fn run(&self, start: Start, stats: &mut Stats) -> Result<()> {
         let args = self.args;
-        let Rendered { frame, solution, layers } = if args.adaptive.is_some() || args.target_error.is_some() {
-            self.adaptive(start, stats)?
-        } else {
-            self.straight(start, stats)?
+        let Rendered { frame, solution, layers } = match self.allocator() {
+            Some(allocator) => self.adaptive(allocator, start, stats)?,
+            None => self.straight(start, stats)?,
         };
         method::write(&args.method, &args.output, &solution, &frame, stats)?;
         layers?;
@@ -49,6 +48,13 @@ impl Job<'_> {
             stats.save(path)?;
         }
         Ok(())
+    }
+
+    /// The allocator that is asked for, or the default one where there is time or an error to decide by.
+    fn allocator(&self) -> Option<&str> {
+        let Args { adaptive, time, target_error, .. } = self.args;
+        let by_default = (time.is_some() && self.method.estimates_error()) || target_error.is_some();
+        adaptive.as_deref().or_else(|| by_default.then(|| ALLOCATORS[0].id()))
     }
 
     fn settings(&self, needs: Needs, budget: Budget) -> RenderSettings {
@@ -87,7 +93,7 @@ impl Job<'_> {
     }
 
     /// In passes that allocate samples to the pixels that need them.
-    fn adaptive(&self, start: Start, stats: &mut Stats) -> Result<Rendered> {
+    fn adaptive(&self, allocator: &str, start: Start, stats: &mut Stats) -> Result<Rendered> {
         let args = self.args;
         let limits = Limits {
             // Without any limit the scene says how much.
@@ -98,7 +104,7 @@ impl Job<'_> {
         let settings = AdaptiveSettings {
             render: self.settings(start.render.film.needs, Budget::Spp(1)),
             method: self.method,
-            allocator: adaptive::allocator(args.adaptive.as_deref().unwrap_or("uniform"))?,
+            allocator: adaptive::allocator(allocator)?,
             limits,
             reconstruction: None,
         };

@@ -35,10 +35,11 @@ pub struct Args {
     /// Samples per pixel [default: the scene's own]
     #[arg(long, conflicts_with = "time", value_parser = clap::value_parser!(u32).range(1..))]
     spp: Option<u32>,
-    /// Time to render for, as in 60, 60s or 5m
+    /// Time for everything but reading and writing, as in 60, 60s or 5m; a method that does not estimate its error comes on top
     #[arg(long, value_parser = super::parse_time, value_name = "TIME")]
     time: Option<Duration>,
-    /// Give more samples to the pixels that need them, by an allocator
+    /// Give more samples to the pixels that need them, by an allocator; with --time and --target-error as long as the
+    /// method estimates its error, unless this says uniform
     #[arg(long, value_name = "ALLOCATOR", num_args = 0..=1, default_missing_value = ALLOCATORS[0].id(), value_parser = allocator_names())]
     adaptive: Option<String>,
     /// Stop when the estimated relMSE is below this; --spp or --time is a limit then

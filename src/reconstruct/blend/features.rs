@@ -6,15 +6,10 @@ use crate::film::Layer;
 use crate::image::planes::Planes;
 use crate::nn::Tensor;
 use crate::reconstruct::inputs::Inputs;
-use crate::reconstruct::residual::{mean, noise, squared_error, windowed};
+use crate::reconstruct::residual::{mean, noise, squared_error, trust, windowed};
 
 /// Radius of the window that residuals are averaged over, by themselves.
 const RESIDUAL: usize = 3;
-
-/// Squared residuals beyond the noise may be this share of it before an image counts as biased; more where few samples, fewer
-/// than this number, say little about the noise.
-const TRUST: f32 = 0.5;
-const FEW: f32 = 16.0;
 
 /// Least share of the noise that a candidate is believed to have as error.
 const LEAST_ERROR: f32 = 0.02;
@@ -94,11 +89,9 @@ impl Evidence {
 
     /// Weights after the safety rule: candidates that differ from the sampled colours by more than noise lose theirs to these.
     pub fn safe(&self, weights: Planes, spp: f32) -> Planes {
-        let (last, allowed) = (weights.channels() - 1, TRUST * (1.0 + FEW / spp));
-        let kept = |k: usize, x: isize, y: isize| {
-            let trust = allowed * self.noise.at(0, x, y) / self.bias.at(k, x, y).max(1e-12);
-            weights.at(k, x, y) * trust.min(1.0)
-        };
+        let last = weights.channels() - 1;
+        let trusts: Vec<_> = (0..last).map(|k| trust(&self.noise, &self.bias.part(k, 1), spp)).collect();
+        let kept = |k: usize, x: isize, y: isize| weights.at(k, x, y) * trusts[k].at(0, x, y);
         Planes::from_fn(weights.width, weights.height, last + 1, |k, x, y| {
             let (x, y) = (x as isize, y as isize);
             if k < last { kept(k, x, y) } else { 1.0 - (0..last).map(|k| kept(k, x, y)).sum::<f32>() }

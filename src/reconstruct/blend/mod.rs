@@ -7,7 +7,9 @@
 //!
 //! Weights are at least zero and sum to one, so that no pixel is worse than the worst candidate. The sampled colours are the
 //! last candidate: they take the weight of images that differ from them by more than noise, which makes the error fall to
-//! zero whatever the network says.
+//! zero whatever the network says. The last method's claimed error is a feature, too.
+//!
+//! Mixtures of Fluxion's own images are no better than the best of them, `net`; so `blend` without Open Image Denoise is `net`.
 
 mod features;
 mod network;
@@ -24,7 +26,7 @@ use crate::image::planes::Planes;
 /// `blend`.
 pub const METHOD: Method = Method {
     id: "blend",
-    summary: "several images mixed pixel by pixel, the weights from a small network; consistent",
+    summary: "net; with oidn=on several images mixed pixel by pixel, the weights from a small network; consistent",
     traits: Traits { edges: EdgeTrust::ByVariance, ..Traits::FILTER },
     parameters: &[
         Parameter {
@@ -51,8 +53,10 @@ const CANDIDATE: u64 = 12;
 /// Methods, and those of their intermediate images that are candidates beside their own.
 type Candidates = &'static [(&'static str, &'static [&'static str])];
 
-const OWN: Candidates = &[("frgr", &["denoised", "level0_enhanced"])];
-const WITH_OIDN: Candidates = &[("frgr:denoiser=oidn", &["denoised", "level0_enhanced"]), ("frgr", &[])];
+const CANDIDATES: Candidates = &[("frgr:denoiser=oidn", &["denoised", "level0_enhanced"]), ("net", &["frgr"])];
+
+/// The trained network for these.
+const WEIGHTS: &[u8] = include_bytes!("oidn.safetensors");
 
 struct Blend {
     methods: Vec<(Box<dyn Reconstruction>, &'static [&'static str])>,
@@ -61,14 +65,21 @@ struct Blend {
 }
 
 fn make(parameters: &Parameters) -> Result<Box<dyn Reconstruction>> {
-    let (candidates, weights) = match parameters.switch("oidn")? {
-        true => (WITH_OIDN, include_bytes!("oidn.safetensors").as_slice()),
-        false => (OWN, include_bytes!("own.safetensors").as_slice()),
-    };
-    let methods = candidates.iter().map(|(method, notes)| Ok((parse(method)?, *notes))).collect::<Result<Vec<_>>>()?;
-    let count = 1 + candidates.iter().map(|(_, notes)| 1 + notes.len()).sum::<usize>();
-    let network = Network::new(weights, count).map_err(|why| Error::backend("blend", why))?;
-    Ok(Box::new(Blend { methods, network, safety: parameters.switch("safety")? }))
+    let safety = parameters.switch("safety")?;
+    if parameters.switch("oidn")? {
+        return Ok(Box::new(Blend::new(CANDIDATES, safety)?));
+    }
+    parse(if safety { "net" } else { "net:safety=off" })
+}
+
+impl Blend {
+    fn new(candidates: Candidates, safety: bool) -> Result<Self> {
+        let make = |(method, notes): &(&str, &'static [&'static str])| Ok((parse(method)?, *notes));
+        let methods = candidates.iter().map(make).collect::<Result<Vec<_>>>()?;
+        let count = 1 + candidates.iter().map(|(_, notes)| 1 + notes.len()).sum::<usize>();
+        let network = Network::new(WEIGHTS, count).map_err(|why| Error::backend(METHOD.id, why))?;
+        Ok(Self { methods, network, safety })
+    }
 }
 
 impl Reconstruction for Blend {
@@ -107,8 +118,8 @@ impl Reconstruction for Blend {
         (context.progress)("blend", 0.9);
         let images: Vec<_> = candidates.iter().map(|image| inputs.mirrored(image, inputs.scale)).collect();
         drop(candidates);
-        let of_frgr = error.map(|error| inputs.mirrored(&error, inputs.scale * inputs.scale));
-        let evidence = Evidence::new(&inputs, &images, of_frgr)?;
+        let claimed = error.map(|error| inputs.mirrored(&error, inputs.scale * inputs.scale));
+        let evidence = Evidence::new(&inputs, &images, claimed)?;
         let weights = self.network.weights(&evidence.features(inputs.spp));
         let kept = if self.safety { evidence.safe(weights, inputs.spp) } else { weights };
         let error = Some(inputs.error(&evidence.error(&kept)));
@@ -135,4 +146,85 @@ fn notes(weights: &Planes, inputs: &Inputs) -> Vec<Note> {
         Note { name: format!("weight{k}"), image: weight.to_image(width, height, 1.0) }
     };
     (0..weights.channels()).map(note).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::vec3;
+    use crate::reconstruct::solve;
+    use crate::synthetic::{Distribution, Noise, change, noisy, picture};
+
+    const SIZE: (usize, usize) = (48, 40);
+
+    /// As with Open Image Denoise, whose place non-local means take.
+    const STAND_IN: Candidates = &[("frgr", &["denoised", "level0_enhanced"]), ("net", &["frgr"])];
+
+    fn frame(truth: &Image, noise: f32, edge: f32, seed: u64) -> Frame {
+        noisy(truth, Noise { color: noise, edge, distribution: Distribution::Normal }, seed)
+    }
+
+    fn solved(method: &dyn Reconstruction, frame: &Frame) -> Solution {
+        solve(method, frame, &Context { notes: true, ..Context::QUIET }).unwrap()
+    }
+
+    fn mse(image: &Image, truth: &Image) -> f64 {
+        crate::metrics::find("mse").unwrap().measure(image, truth).unwrap().mean
+    }
+
+    #[test]
+    fn every_value_lies_among_those_of_the_candidates() {
+        let frame = frame(&picture(SIZE), 0.3, 0.1, 1);
+        let note =
+            |solution: &Solution, name: &str| solution.notes.iter().find(|n| n.name == name).unwrap().image.clone();
+        let [frgr, net] = ["frgr", "net"].map(|method| solved(parse(method).unwrap().as_ref(), &frame));
+        let inner = ["denoised", "level0_enhanced"].map(|name| note(&frgr, name));
+        let colors = frame.get(Layer::Color).unwrap();
+        let candidates = [&frgr.image, &inner[0], &inner[1], &net.image, &frgr.image, colors];
+        for safety in [true, false] {
+            let blend = solved(&Blend::new(STAND_IN, safety).unwrap(), &frame);
+            for (i, value) in blend.image.data.iter().enumerate() {
+                let of =
+                    |choose: fn(f32, f32) -> f32| candidates.iter().map(|image| image.data[i]).reduce(choose).unwrap();
+                assert!((of(f32::min) - 1e-4..=of(f32::max) + 1e-4).contains(value), "{value}");
+            }
+            let weights = |i: usize| blend.notes.iter().map(|note| note.image.data[i]).sum::<f32>();
+            assert_eq!(blend.notes.len(), candidates.len());
+            assert!((0..blend.image.data.len()).all(|i| (weights(i) - 1.0).abs() < 1e-5));
+        }
+    }
+
+    #[test]
+    fn errors_fall_with_the_noise_and_their_estimates_with_them() {
+        let (truth, blend) = (picture(SIZE), Blend::new(STAND_IN, true).unwrap());
+        let [coarse, fine] = [0.4, 0.05].map(|noise| {
+            let solutions = [1, 2, 3].map(|seed| solved(&blend, &frame(&truth, noise, 0.3 * noise, seed)));
+            let error = solutions.iter().map(|solution| mse(&solution.image, &truth)).sum::<f64>() / 3.0;
+            let claims = solutions.iter().flat_map(|solution| solution.error.as_ref().unwrap().data.iter());
+            let claimed = claims.map(|&claim| f64::from(claim)).sum::<f64>() / (3.0 * truth.data.len() as f64);
+            assert!(error < 0.2 * f64::from(noise * noise), "{error:.2e} of noise {noise}");
+            assert!((0.2..5.0).contains(&(claimed / error)), "{claimed:.2e} for {error:.2e}");
+            error
+        });
+        assert!(fine < 0.05 * coarse, "{fine:.2e} after {coarse:.2e}");
+    }
+
+    #[test]
+    fn where_no_candidate_can_be_right_the_colours_stay() {
+        // A pattern that no feature shows, with differences that deny it and claim to be certain, in colours without noise.
+        let pattern = |x: usize, y: usize| vec3(1.0, 1.0, 1.0) * (1.0 + 0.5 * ((x * 7 + y * 11) % 5) as f32);
+        let truth = Image::from_rgb(SIZE.0, SIZE.1, pattern);
+        let mut frame = frame(&truth, 1e-3, 1e-4, 4);
+        [Layer::Dx, Layer::Dy].into_iter().for_each(|layer| change(&mut frame, layer, |_, _| 0.0));
+        let [safe, free] =
+            [true, false].map(|safety| mse(&solved(&Blend::new(STAND_IN, safety).unwrap(), &frame).image, &truth));
+        assert!(safe < 1e-4 && free > 10.0 * safe, "{safe:.1e}, without the rule {free:.1e}");
+    }
+
+    #[test]
+    fn own_images_are_those_of_net() {
+        let frame = frame(&picture(SIZE), 0.2, 0.1, 2);
+        let [blend, net] = ["blend", "net"].map(|method| solved(parse(method).unwrap().as_ref(), &frame).image);
+        assert_eq!(blend, net);
+    }
 }

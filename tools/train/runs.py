@@ -1,0 +1,62 @@
+"""Training runs: steps that can be interrupted and resumed, with a log; a step is the same whenever it is taken."""
+import csv
+import os
+import time
+
+import numpy as np
+import torch
+
+# Ten scenes of every hundred are kept apart for tests.
+APART = 9
+
+
+def is_apart(name):
+    return int(name) // 10 % 10 == APART
+
+
+def arguments(parser, steps):
+    """Options that every run has."""
+    parser.add_argument("frames", nargs="+")
+    parser.add_argument("--run", required=True)
+    parser.add_argument("--steps", type=int, default=steps)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--threads", type=int, default=2)
+
+
+def state_path(folder):
+    return os.path.join(folder, "state.pt")
+
+
+def train(parts, step_of, options):
+    """Calls `step_of(rng, step)`, which returns a number for the log, until all steps are done. `parts` are what a state consists
+    of, by their names: networks, optimisers, schedules."""
+    torch.set_num_threads(options.threads)
+    os.makedirs(options.run, exist_ok=True)
+    path, step = state_path(options.run), 0
+    if os.path.exists(path):
+        state = torch.load(path)
+        step = state["step"]
+        for name, part in parts.items():
+            part.load_state_dict(state[name])
+    print(f"from step {step}", flush=True)
+    with open(os.path.join(options.run, "log.csv"), "a", newline="") as file:
+        log, saved, values = csv.writer(file), time.time(), []
+        while step < options.steps:
+            values.append(step_of(np.random.default_rng([options.seed, step]), step))
+            step += 1
+            if step % 200 == 0:
+                log.writerow([step, "%.5f" % np.mean(values)])
+                file.flush()
+                print(step, "%.4f" % np.mean(values), flush=True)
+                values = []
+            if time.time() - saved > 60 or step == options.steps:
+                torch.save({"step": step, **{name: part.state_dict() for name, part in parts.items()}}, path + ".part")
+                os.replace(path + ".part", path)
+                saved = time.time()
+
+
+def trained(net, options, name="net"):
+    """The network of a run, and its number of steps."""
+    state = torch.load(state_path(options.run))
+    net.load_state_dict(state[name])
+    return net, state["step"]
