@@ -8,7 +8,6 @@ mod feature;
 mod features;
 mod frgr;
 mod generated;
-mod gradnet;
 mod inputs;
 mod l1;
 mod l2;
@@ -154,7 +153,6 @@ pub const METHODS: &[Method] = &[
     l1::METHOD,
     control_variate::METHOD,
     least_trimmed::METHOD,
-    gradnet::METHOD,
     nlm::METHOD,
     rdfc::METHOD,
     nfor::METHOD,

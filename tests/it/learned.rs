@@ -1,8 +1,7 @@
-//! `net` and `gradnet`: trained networks on frames whose truth is known, in bands and at any size.
+//! `net`: a trained network on frames whose truth is known.
 
 use fluxion::film::{Frame, Layer};
 use fluxion::image::Image;
-use fluxion::math::vec3;
 use fluxion::metrics;
 use fluxion::reconstruct::{Context, Solution, parse, solve};
 use fluxion::synthetic::{Distribution, Noise, change, noisy, picture};
@@ -25,15 +24,13 @@ fn mse(image: &Image, truth: &Image) -> f64 {
 
 #[test]
 fn errors_are_those_that_are_claimed() {
-    for (method, factor) in [("net", 4.0), ("gradnet", 8.0)] {
-        let truth = picture((61, 45));
-        for noise in [0.4, 0.1] {
-            let solutions = [1, 2, 3].map(|seed| solved(method, &frame((61, 45), noise, seed)));
-            let error = solutions.iter().map(|solution| mse(&solution.image, &truth)).sum::<f64>() / 3.0;
-            let claims = solutions.iter().flat_map(|solution| solution.error.as_ref().unwrap().data.iter());
-            let claimed = claims.map(|&claim| f64::from(claim)).sum::<f64>() / (3.0 * truth.data.len() as f64);
-            assert!((1.0 / factor..factor).contains(&(claimed / error)), "{method}: {claimed:.2e} for {error:.2e}");
-        }
+    let truth = picture((61, 45));
+    for noise in [0.4, 0.1] {
+        let solutions = [1, 2, 3].map(|seed| solved("net", &frame((61, 45), noise, seed)));
+        let error = solutions.iter().map(|solution| mse(&solution.image, &truth)).sum::<f64>() / 3.0;
+        let claims = solutions.iter().flat_map(|solution| solution.error.as_ref().unwrap().data.iter());
+        let claimed = claims.map(|&claim| f64::from(claim)).sum::<f64>() / (3.0 * truth.data.len() as f64);
+        assert!((0.2..5.0).contains(&(claimed / error)), "{claimed:.2e} for {error:.2e}");
     }
 }
 
@@ -64,13 +61,4 @@ fn a_firefly_does_not_leave_the_range_around_it() {
         // Half of the luminance is allowed beyond, and a twentieth of the typical one.
         assert!(largest(x, y, &net.image) <= 2.5 * most + 0.2, "{x},{y}: {:?}", net.image.rgb(x, y));
     }
-}
-
-#[test]
-fn means_of_the_colours_are_kept_by_the_correction() {
-    let truth = Image::from_rgb(96, 80, |x, y| vec3(0.3, 0.5, 0.8) * (1.0 + 0.2 * ((x / 9 + y / 7) % 3) as f32));
-    let frame = noisy(&truth, Noise { color: 0.1, edge: 0.03, distribution: Distribution::Normal }, 6);
-    let mean = |image: &Image| image.data.iter().map(|&value| f64::from(value)).sum::<f64>() / image.data.len() as f64;
-    let (with, expected) = (mean(&solved("gradnet", &frame).image), mean(&truth));
-    assert!((with / expected - 1.0).abs() < 0.01, "{with} instead of {expected}");
 }

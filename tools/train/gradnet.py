@@ -33,6 +33,7 @@ RATE = {"paper": 1e-4, "own": 5e-4}
 # Radius and deviation of the window whose means are corrected, and least mean, over the image's.
 RADIUS, DEVIATION, DARK = 45, 15.0, 1e-3
 HALF_MAX = 6e4
+SOLVERS = ["l2", "l1"]
 METHODS = ["l2", "l1", "control_variate", "least_trimmed", "frgr"]
 
 
@@ -269,7 +270,9 @@ def solved(net, sample):
 
 
 def test(options):
-    """Errors on the scenes kept apart, geometric means over frames, the targets' noise taken off."""
+    """Errors on the scenes kept apart, geometric means over frames, the targets' noise taken off. True if those of GradNet are below
+    the solvers' at every sample count."""
+    good = True
     net, _ = runs.trained(GradNet(INPUTS[options.preset]), options)
     rows = {}
     for sample in load(options, True):
@@ -283,16 +286,22 @@ def test(options):
     for spp in sorted(rows):
         means = np.exp(np.log(rows[spp]).mean(0))
         print("| %d | %d | %s |" % (spp, len(rows[spp]), " | ".join("%.5f" % mean for mean in means)))
+        good &= means[-1] < min(means[methods.index(method)] for method in SOLVERS)
+    return good
 
 
 def export(options):
-    """Writes half floats, and for the tests what the network makes of them on one crop."""
+    """Writes half floats if the gate holds, and for tests what the network makes of them on one crop."""
+    if not test(options):
+        raise SystemExit("not exported: a solver is better")
     net, steps = runs.trained(GradNet(INPUTS[options.preset]), options)
     net = net.half().float()
     top = os.path.join(os.path.dirname(__file__), "..", "..")
     recipe = {"preset": options.preset, "steps": steps, "batch": BATCH, "crop": CROP, "rate": RATE[options.preset], "seed": options.seed}
+    folder = os.path.join(top, "src/reconstruct/gradnet")
+    os.makedirs(folder, exist_ok=True)
     save_file({name: value.half().contiguous() for name, value in net.state_dict().items()},
-              os.path.join(top, "src/reconstruct/gradnet", options.preset + ".safetensors"), {"recipe": json.dumps(recipe)})
+              os.path.join(folder, options.preset + ".safetensors"), {"recipe": json.dumps(recipe)})
     sample = load(options, True)[0]
     part = {key: sample[key][..., :24, :40].float() for key in ("data", "gradient")}
     with torch.no_grad():

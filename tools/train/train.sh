@@ -61,7 +61,6 @@ net | blend)
 	with_targets 13579 odd 2,8,32
 	weights net net "$folder/frames-even" "$folder/frames-odd"
 	if [ "$method" = blend ]; then
-		weights blend blend-own own "$folder/frames-even" "$folder/frames-odd"
 		weights blend blend-oidn oidn "$folder/frames-even" "$folder/frames-odd"
 	fi
 	;;

@@ -6,7 +6,7 @@ use crate::film::Layer;
 use crate::image::planes::Planes;
 use crate::nn::Tensor;
 use crate::reconstruct::inputs::Inputs;
-use crate::reconstruct::residual::{mean, noise, squared_error, trust, windowed};
+use crate::reconstruct::residual::{estimated_error, mean, noise, squared_error, trust, windowed};
 
 /// Radius of the window that residuals are averaged over, by themselves.
 const RESIDUAL: usize = 3;
@@ -32,14 +32,14 @@ pub struct Evidence {
     /// Its means over the windows of residuals and of biases.
     residual_noise: Planes,
     noise: Planes,
-    /// Expected squared error that the last method claims.
+    /// Estimated squared error of one of them.
     claimed: Planes,
     albedo: Planes,
 }
 
 impl Evidence {
-    /// Evidence from candidates, of which the last one is the sampled colour.
-    pub fn new(inputs: &Inputs, images: &[Planes], claimed: Option<Planes>) -> Result<Self> {
+    /// Evidence from candidates, of which the last one is the sampled colour and number `best` the one whose error is looked at.
+    pub fn new(inputs: &Inputs, images: &[Planes], best: usize) -> Result<Self> {
         let [color, variance] = inputs.color()?;
         let variance = noise(&variance);
         let of_each = |of: &dyn Fn(usize) -> Planes| (1..images.len()).fold(of(0), |all: Planes, k| all.and(&of(k)));
@@ -50,7 +50,7 @@ impl Evidence {
         let bias = of_each(&|k| squared_error(&color, &variance, &images[k]));
         let noise = windowed(&variance).map(|noise| noise.max(1e-9));
         let residual_noise = variance.box_mean(RESIDUAL);
-        let claimed = claimed.map_or_else(|| variance.clone(), |claimed| mean(&claimed));
+        let claimed = estimated_error(&color, &variance, &images[best]);
         let albedo = mean(&inputs.planes(Layer::Albedo, 1.0)?);
         Ok(Self { luminance, residual, bias, variance, residual_noise, noise, claimed, albedo })
     }

@@ -7,7 +7,7 @@
 //!
 //! Weights are at least zero and sum to one, so that no pixel is worse than the worst candidate. The sampled colours are the
 //! last candidate: they take the weight of images that differ from them by more than noise, which makes the error fall to
-//! zero whatever the network says. The last method's claimed error is a feature, too.
+//! zero whatever the network says. The estimated error of the last method's image is a feature, too.
 //!
 //! Mixtures of Fluxion's own images are no better than the best of them, `net`; so `blend` without Open Image Denoise is `net`.
 
@@ -100,26 +100,25 @@ impl Reconstruction for Blend {
         }
         frame.require(Layer::Albedo)?;
         let pixels = (frame.width * frame.height) as u64;
-        let (mut candidates, mut error) = (Vec::new(), None);
+        let (mut candidates, mut best) = (Vec::new(), 0);
         for (k, (method, notes)) in self.methods.iter().enumerate() {
             let share = 0.9 / self.methods.len() as f32;
             let report = |what: &str, done: f32| (context.progress)(what, (k as f32 + done) * share);
             let held = pixels * (NOTES + CANDIDATE * candidates.len() as u64);
             let memory = context.memory.map(|memory| memory.saturating_sub(held));
             let solution = method.reconstruct(frame, &Context { progress: &report, memory, notes: true })?;
+            best = candidates.len();
             candidates.push(solution.image);
             for name in *notes {
                 let note = solution.notes.iter().find(|note| note.name == *name);
                 candidates.extend(note.map(|note| note.image.clone()));
             }
-            error = solution.error;
         }
         candidates.push(frame.require(Layer::Color)?.clone());
         (context.progress)("blend", 0.9);
         let images: Vec<_> = candidates.iter().map(|image| inputs.mirrored(image, inputs.scale)).collect();
         drop(candidates);
-        let claimed = error.map(|error| inputs.mirrored(&error, inputs.scale * inputs.scale));
-        let evidence = Evidence::new(&inputs, &images, claimed)?;
+        let evidence = Evidence::new(&inputs, &images, best)?;
         let weights = self.network.weights(&evidence.features(inputs.spp));
         let kept = if self.safety { evidence.safe(weights, inputs.spp) } else { weights };
         let error = Some(inputs.error(&evidence.error(&kept)));

@@ -13,7 +13,7 @@ mod features;
 
 use self::features::{DARK, features};
 use super::inputs::{Inputs, check_memory};
-use super::residual::{estimated_error, mean, noise, squared_error, trust, windowed};
+use super::residual::{mean, noise, squared_error, trust, windowed};
 use super::{Context, EdgeTrust, Method, Note, Parameter, Parameters, Reconstruction, Solution, Traits, parse};
 use crate::error::{Error, Result};
 use crate::film::{Frame, Needs};
@@ -106,11 +106,15 @@ impl Reconstruction for Net {
         } else {
             corrected
         };
-        let error = inputs.error(&estimated_error(&color, &noise, &image));
         let image = image.to_image(frame.width, frame.height, 1.0 / inputs.scale);
         let mut notes = solution.notes;
         notes.push(Note { name: "frgr".into(), image: solution.image });
-        Ok(Solution { image, alpha: None, error: Some(error), notes: if context.notes { notes } else { Vec::new() } })
+        Ok(Solution {
+            image,
+            alpha: None,
+            error: solution.error,
+            notes: if context.notes { notes } else { Vec::new() },
+        })
     }
 }
 
