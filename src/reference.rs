@@ -183,11 +183,13 @@ impl Reference {
 
 /// Expected relMSE of the mean of two independent halves, from their difference.
 pub fn floor(image: &Image, difference: &Image) -> f64 {
-    let relative = |(&value, &difference): (&f32, &f32)| {
-        let (value, half) = (f64::from(value), f64::from(difference) / 2.0);
-        half * half / (value * value + 0.01)
-    };
-    image.data.iter().zip(&difference.data).map(relative).sum::<f64>() / image.data.len() as f64
+    relative(image, difference.data.iter().map(|&difference| (f64::from(difference) / 2.0).powi(2)))
+}
+
+/// Mean of squared errors over the squares of an image's values, as relMSE has it.
+pub fn relative(image: &Image, squares: impl Iterator<Item = f64>) -> f64 {
+    let of = |(&value, square): (&f32, f64)| square / (f64::from(value) * f64::from(value) + 0.01);
+    image.data.iter().zip(squares).map(of).sum::<f64>() / image.data.len() as f64
 }
 
 fn not_one(path: &Path, why: &str) -> Error {

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use crate::error::{Error, Result};
 use crate::image::{Image, io};
-use crate::reference::{Reference, check};
+use crate::reference::{Reference, check, relative};
 use crate::scene::{Scene, load};
 
 /// A reference image.
@@ -71,7 +71,11 @@ fn truth(path: &Path) -> Result<(Truth, Option<String>)> {
     if let Some((x, y, _)) = image.not_finite() {
         return Err(Error::bad_data(path, format!("the value at pixel {x},{y} is not finite")));
     }
-    let floor = noise(path)?.map(|variance| relative(&image, &variance));
+    let floor = noise(path)?.map(|variance| {
+        // Infinite variances and those below zero do not count.
+        let sane = |&variance: &f32| if variance.is_finite() { f64::from(variance.max(0.0)) } else { 0.0 };
+        relative(&image, variance.data.iter().map(sane))
+    });
     Ok((Truth { image, floor }, None))
 }
 
@@ -79,13 +83,6 @@ fn truth(path: &Path) -> Result<(Truth, Option<String>)> {
 fn noise(path: &Path) -> Result<Option<Image>> {
     let beside = path.file_stem().map(|stem| path.with_file_name(format!("{}_var.exr", stem.to_string_lossy())));
     beside.filter(|file| file.is_file()).map(|file| io::read_color(&file)).transpose()
-}
-
-/// Expected relMSE of an image whose values have these variances; infinite ones and those below zero do not count.
-fn relative(image: &Image, variance: &Image) -> f64 {
-    let of = |(&value, &variance): (&f32, &f32)| f64::from(variance) / (f64::from(value).powi(2) + 0.01);
-    let all = image.data.iter().zip(&variance.data).filter(|(_, variance)| variance.is_finite() && **variance >= 0.0);
-    all.map(of).sum::<f64>() / image.data.len() as f64
 }
 
 fn find(path: &Path, name: &str, reference: Option<&Path>) -> Result<PathBuf> {

@@ -31,15 +31,6 @@ pub fn squared_error(color: &Planes, noise: &Planes, image: &Planes) -> Planes {
     square.zip(noise, |square, noise| square - noise).box_mean(RADIUS)
 }
 
-/// Least share of the noise that an image is believed to have as squared error.
-const LEAST_ERROR: f32 = 0.02;
-
-/// Squared error as [`squared_error`] has it, at least a small share of the noise.
-pub fn estimated_error(color: &Planes, noise: &Planes, image: &Planes) -> Planes {
-    let found = squared_error(color, noise, image);
-    found.zip(&windowed(noise), |found, noise| found.max(LEAST_ERROR * noise))
-}
-
 /// Means over the window of [`squared_error`].
 pub fn windowed(planes: &Planes) -> Planes {
     planes.box_mean(RADIUS)

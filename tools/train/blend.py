@@ -22,6 +22,7 @@ import frames
 import net
 import residual
 import runs
+from frames import planes
 
 # Images; the last, the sampled colours, takes what the safety rule leaves.
 CANDIDATES = {"own": ["net", "frgr", "frgr_denoised", "frgr_level0_enhanced", ""],
@@ -46,10 +47,6 @@ def weigher(candidates):
     with torch.no_grad():
         layers[-1].bias[-1] = -4
     return nn.Sequential(*layers)
-
-
-def planes(array):
-    return torch.from_numpy(np.ascontiguousarray(np.moveaxis(array, -1, 0)))
 
 
 def prepare(frame, names, network):

@@ -4,6 +4,7 @@ import json
 import os
 
 import numpy as np
+import torch
 
 # Least typical luminance, and regularisation of relMSE.
 DARK, EPSILON = 1e-18, 0.01
@@ -16,6 +17,11 @@ def typical_luminance(colour):
     luminance = np.maximum(colour.mean(-1, dtype=np.float64), 0)
     mean = luminance.mean()
     return max(float(np.exp(np.log(luminance + 1e-3 * mean).mean())), DARK) if mean > 0 else 1.0
+
+
+def planes(array):
+    """An image as PyTorch takes it, channels first."""
+    return torch.from_numpy(np.ascontiguousarray(np.moveaxis(array, -1, 0)))
 
 
 class Frame:

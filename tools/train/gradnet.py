@@ -20,6 +20,7 @@ from torch.nn import functional as F
 
 import frames
 import runs
+from frames import planes
 
 MU = 16.0
 WIDTH, BLOCKS, SLOPE = 16, 4, 0.01
@@ -87,10 +88,6 @@ def branch(inputs):
     """Slopes of the compressed colours along the features, seven for each channel."""
     return nn.Sequential(nn.Conv2d(inputs, BRANCH, 3, padding=1), nn.LeakyReLU(SLOPE), nn.Conv2d(BRANCH, BRANCH, 3, padding=1),
                          nn.LeakyReLU(SLOPE), nn.Conv2d(BRANCH, 21, 3, padding=1))
-
-
-def planes(array):
-    return torch.from_numpy(np.ascontiguousarray(np.moveaxis(array, -1, 0)))
 
 
 def prepare(frame, preset):

@@ -21,6 +21,7 @@ from torch.nn import functional as F
 import frames
 import residual
 import runs
+from frames import planes
 
 # Images that are mixed, and the sampled colours, which are only looked at.
 IMAGES = ["frgr", "frgr_denoised", "frgr_level0_enhanced", ""]
@@ -86,10 +87,6 @@ def corrected(logits, images, spp=1):
     return free.maximum(bound(extreme(base, False), -room)).minimum(bound(extreme(base, True), room))
 
 
-def planes(array):
-    return torch.from_numpy(np.ascontiguousarray(np.moveaxis(array, -1, 0)))
-
-
 def variance_of(frame):
     return (planes(frame.radiance("sigma")) ** 2).mean(0, keepdim=True)
 
@@ -126,7 +123,8 @@ def samples(folders):
         noise = planes(0.25 * frame.difference ** 2)
         error = ((images[0] - target) ** 2 - noise) / divisor
         sample = {"images": images.half(), "features": features(frame, images).half(), "target": target, "divisor": divisor,
-                  "error": error, "whole": error.mean().expand_as(error[:1]), "noise": noise / divisor, "variance": variance_of(frame), "spp": frame.spp, "name": frame.name, "frame": frame}
+                  "error": error, "whole": error.mean().expand_as(error[:1]), "noise": noise / divisor, "variance": variance_of(frame),
+                  "spp": frame.spp, "name": frame.name, "frame": frame}
         if not all(torch.isfinite(sample[key]).all() for key in ("images", "features", "target")):
             continue
         frame.array = None
@@ -241,7 +239,8 @@ def export(options):
         logits = net(part("features")[None])
         made = corrected(logits, part("images")[None], 2 * FEW)[0]
     pixels = lambda planes: planes.permute(1, 2, 0).contiguous()
-    save_file({"features": pixels(part("features")), "images": pixels(part("images").flatten(0, 1)), "logits": pixels(logits[0]), "output": pixels(made)}, os.path.join(TOP, "tests/data/net.safetensors"))
+    save_file({"features": pixels(part("features")), "images": pixels(part("images").flatten(0, 1)), "logits": pixels(logits[0]),
+               "output": pixels(made)}, os.path.join(TOP, "tests/data/net.safetensors"))
 
 
 if __name__ == "__main__":

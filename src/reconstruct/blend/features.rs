@@ -6,7 +6,7 @@ use crate::film::Layer;
 use crate::image::planes::Planes;
 use crate::nn::Tensor;
 use crate::reconstruct::inputs::Inputs;
-use crate::reconstruct::residual::{estimated_error, mean, noise, squared_error, trust, windowed};
+use crate::reconstruct::residual::{mean, noise, squared_error, trust, windowed};
 
 /// Radius of the window that residuals are averaged over, by themselves.
 const RESIDUAL: usize = 3;
@@ -50,7 +50,8 @@ impl Evidence {
         let bias = of_each(&|k| squared_error(&color, &variance, &images[k]));
         let noise = windowed(&variance).map(|noise| noise.max(1e-9));
         let residual_noise = variance.box_mean(RESIDUAL);
-        let claimed = estimated_error(&color, &variance, &images[best]);
+        // What residuals tell of it, at least a small share of the noise.
+        let claimed = bias.part(best, 1).zip(&noise, |bias, noise| bias.max(LEAST_ERROR * noise));
         let albedo = mean(&inputs.planes(Layer::Albedo, 1.0)?);
         Ok(Self { luminance, residual, bias, variance, residual_noise, noise, claimed, albedo })
     }
