@@ -53,8 +53,10 @@ pub struct Spent {
     pub elapsed: f64,
     /// Seconds of rendering.
     pub rendering: f64,
-    /// Seconds that a reconstruction takes, as far as is known.
+    /// Seconds that the last reconstruction takes, as far as is known.
     pub reconstruction: f64,
+    /// Seconds that one between passes takes.
+    pub between: f64,
 }
 
 /// Limits of a run, and the inputs of its decisions.
@@ -108,7 +110,7 @@ impl Budget {
             Some(_) => f64::from(2 * FIRST_SPP),
             None => f64::from(FIRST_SPP).max(FIRST_SHARE * all),
         };
-        let too_slow = |time: Duration| self.by_error && spent.reconstruction > 2.0 * OVERHEAD * time.as_secs_f64();
+        let too_slow = |time: Duration| self.by_error && spent.between > 2.0 * OVERHEAD * time.as_secs_f64();
         let decides = error.is_some() || !self.uniform;
         if decides && all > 1.5 * first && !time.is_some_and(too_slow) {
             return FirstPass::Uniform(first as u32);
@@ -139,7 +141,7 @@ impl Budget {
         if left == 0 {
             return None;
         }
-        let cost = if self.by_error { spent.reconstruction } else { 0.0 };
+        let cost = if self.by_error { spent.between } else { 0.0 };
         let time = self.limits.time.map(|time| time.as_secs_f64());
         // As many passes as the reconstructions between them leave time for.
         let reconstructions = time.map_or(f64::INFINITY, |time| OVERHEAD * time / cost.max(1e-9));
@@ -159,7 +161,7 @@ mod tests {
     use super::*;
 
     fn spent(spp: f64, elapsed: f64) -> Spent {
-        Spent { pixels: 100.0, samples: 100.0 * spp, elapsed, rendering: elapsed, reconstruction: 0.1 }
+        Spent { pixels: 100.0, samples: 100.0 * spp, elapsed, rendering: elapsed, reconstruction: 0.1, between: 0.1 }
     }
 
     fn budget(limits: Limits) -> Budget {
@@ -186,11 +188,10 @@ mod tests {
         let budget = budget(Limits { time: Some(Duration::from_secs(10)), ..Limits::default() });
         // A hundred samples a second, one second gone, a tenth for the last reconstruction.
         assert!((budget.affordable(&spent(1.0, 1.0)) - 890.0).abs() < 1e-9);
-        let slow = Spent { reconstruction: 3.0, ..spent(1.0, 1.0) };
+        let slow = Spent { reconstruction: 3.0, between: 3.0, ..spent(1.0, 1.0) };
         assert!(matches!(budget.first_pass(&slow), FirstPass::Everything(_)));
         // A reconstruction of 0.6 s leaves time for one between two passes.
-        let pass =
-            budget.next_pass(&Spent { reconstruction: 0.6, ..spent(10.0, 5.0) }, (1, PASSES), Some(0.1)).unwrap();
+        let pass = budget.next_pass(&Spent { between: 0.6, ..spent(10.0, 5.0) }, (1, PASSES), Some(0.1)).unwrap();
         assert_eq!(pass.left, 1);
         let last = budget.next_pass(&spent(10.0, 9.0), (3, 1), Some(0.1)).unwrap();
         assert_eq!(budget.before_speed_check(last), Some(SPEED_CHECK_SHARE * last.samples));

@@ -17,7 +17,7 @@ use crate::scene::Scene;
 pub struct AdaptiveSettings<'a> {
     /// Seed, needs and shift of the samples; its budget is ignored.
     pub render: RenderSettings,
-    /// Reconstruction of the image, after every pass that is decided by its error.
+    /// Reconstruction of the image; it or its guide also after every pass that is decided by the error.
     pub method: &'a dyn Reconstruction,
     /// Measure of where samples are needed.
     pub allocator: &'a dyn Allocator,
@@ -92,9 +92,13 @@ pub fn resume(
 struct Times {
     develop: f64,
     reconstruct: f64,
-    /// Duration of the last reconstruction.
-    last: Option<f64>,
+    /// Duration of the method, and of its guide.
+    method: Option<f64>,
+    guide: Option<f64>,
 }
+
+/// Share of a method's duration that its guide is taken to need until it has been measured.
+const GUIDE_SHARE: f64 = 0.5;
 
 struct Run<'a> {
     scene: &'a Scene,
@@ -113,6 +117,8 @@ struct Evaluation {
     frame: Frame,
     /// None if no decision depends on it.
     solution: Option<Solution>,
+    /// Whether it is the guide's.
+    guided: bool,
     /// Estimated relMSE.
     error: Option<f64>,
 }
@@ -144,8 +150,8 @@ impl Run<'_> {
         if let Some(sink) = self.control.sink {
             sink.save(&self.render);
         }
-        let Evaluation { frame, solution, .. } = state;
-        let solution = solution.map_or_else(|| self.solve(&frame), Ok)?;
+        let Evaluation { frame, solution, guided, .. } = state;
+        let solution = solution.filter(|_| !guided).map_or_else(|| self.solve(&frame, false), Ok)?;
         let passes = self.journal().notes.passes.clone();
         let Times { develop, reconstruct, .. } = self.times;
         Ok(AdaptiveOutcome { frame, solution, develop, reconstruct, render: self.render, passes })
@@ -157,12 +163,18 @@ impl Run<'_> {
 
     fn spent(&self) -> Spent {
         let known = self.settings.reconstruction.map(|known| known.as_secs_f64());
+        let reconstruction = self.times.method.or(known).unwrap_or(0.0);
+        let between = match self.settings.method.guide() {
+            Some(_) => self.times.guide.unwrap_or(GUIDE_SHARE * reconstruction),
+            None => reconstruction,
+        };
         Spent {
             pixels: (self.render.film.width * self.render.film.height) as f64,
             samples: self.render.film.samples() as f64,
             elapsed: self.start.elapsed().as_secs_f64(),
             rendering: self.render.elapsed.as_secs_f64(),
-            reconstruction: self.times.last.or(known).unwrap_or(0.0),
+            reconstruction,
+            between,
         }
     }
 
@@ -244,12 +256,15 @@ impl Run<'_> {
         frame
     }
 
-    fn solve(&mut self, frame: &Frame) -> Result<Solution> {
+    /// Reconstructs with the method or its guide, if it has one.
+    fn solve(&mut self, frame: &Frame, guided: bool) -> Result<Solution> {
         let start = Instant::now();
-        let solution = reconstruct::solve(self.settings.method, frame, self.context)?;
+        let method = self.settings.method;
+        let method = if guided { method.guide().unwrap_or(method) } else { method };
+        let solution = reconstruct::solve(method, frame, self.context)?;
         let seconds = start.elapsed().as_secs_f64();
         self.times.reconstruct += seconds;
-        self.times.last = Some(seconds);
+        *(if guided { &mut self.times.guide } else { &mut self.times.method }) = Some(seconds);
         Ok(solution)
     }
 
@@ -258,7 +273,7 @@ impl Run<'_> {
         let frame = self.develop();
         if self.render.stopped {
             // The pass has not ended: a resumed run finishes it.
-            return Ok(Evaluation { frame, solution: None, error: None });
+            return Ok(Evaluation { frame, solution: None, guided: false, error: None });
         }
         self.journal().learn(&frame);
         let state = self.evaluate(frame)?;
@@ -270,8 +285,13 @@ impl Run<'_> {
     /// Reconstructs and estimates the error, if a decision depends on it.
     fn evaluate(&mut self, frame: Frame) -> Result<Evaluation> {
         let notes = self.journal().notes.clone();
-        let solution = if self.budget.by_error && notes.left > 0 { Some(self.solve(&frame)?) } else { None };
+        // A target is one of the method's own image; and to leave time for the last reconstruction it has to be measured once.
+        let Limits { time, error, .. } = self.settings.limits;
+        let itself = error.is_some() || (time.is_some() && self.spent().reconstruction == 0.0);
+        let guided = self.settings.method.guide().is_some() && !itself;
+        let decides = self.budget.by_error && notes.left > 0;
+        let solution = if decides { Some(self.solve(&frame, guided)?) } else { None };
         let error = solution.as_ref().map(|solution| notes.estimate.rel_mse(&frame, solution));
-        Ok(Evaluation { frame, solution, error })
+        Ok(Evaluation { frame, solution, guided, error })
     }
 }

@@ -75,6 +75,11 @@ pub trait Reconstruction: Send + Sync {
         false
     }
 
+    /// The quicker method whose estimated error this one has, if there is one: it serves between passes of adaptive sampling.
+    fn guide(&self) -> Option<&dyn Reconstruction> {
+        None
+    }
+
     /// The image without directly seen emitters, which [`solve`] adds.
     fn reconstruct(&self, frame: &Frame, context: &Context) -> Result<Solution>;
 }

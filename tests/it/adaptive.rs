@@ -56,6 +56,22 @@ fn budgets_are_met_to_the_sample_by_every_method_and_allocator() {
 }
 
 #[test]
+fn a_guide_decides_as_the_method_would_and_the_image_is_the_methods() {
+    let scene = bundled("cornell-box", (32, 24));
+    let net = reconstruct::parse("net").unwrap();
+    let outcome = run(&scene, "net", ALLOCATORS[0], spp(24)).unwrap();
+    let whole = |method| reconstruct::solve(method, &outcome.frame, &Context::QUIET).unwrap();
+    let (own, guide) = (whole(net.as_ref()), whole(net.guide().unwrap()));
+    assert_eq!(outcome.solution.image, own.image);
+    assert_ne!(own.image, guide.image);
+    assert_eq!(own.error, guide.error);
+    // The guide's needs are the method's.
+    assert_eq!(net.needs().union(net.guide().unwrap().needs()), net.needs());
+    let guided = run(&scene, "frgr", ALLOCATORS[0], spp(24)).unwrap();
+    assert_eq!(outcome.render.film.counts(), guided.render.film.counts());
+}
+
+#[test]
 fn small_budgets_are_shared_evenly() {
     let scene = bundled("unit/diffuse", (9, 7));
     for n in [1, 2, 8] {

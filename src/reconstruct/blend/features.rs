@@ -14,9 +14,6 @@ const RESIDUAL: usize = 3;
 /// Least share of the noise that a candidate is believed to have as error.
 const LEAST_ERROR: f32 = 0.02;
 
-/// True error over the claimed one, on frames that the network was not trained on.
-const CALIBRATION: f32 = 1.0;
-
 /// Luminance below which differences count as absolute, in units of the typical luminance.
 const DARK: f32 = 0.1;
 
@@ -96,17 +93,6 @@ impl Evidence {
         Planes::from_fn(weights.width, weights.height, last + 1, |k, x, y| {
             let (x, y) = (x as isize, y as isize);
             if k < last { kept(k, x, y) } else { 1.0 - (0..last).map(|k| kept(k, x, y)).sum::<f32>() }
-        })
-    }
-
-    /// Expected squared error of the sum by weights, mean over the channels.
-    pub fn error(&self, weights: &Planes) -> Planes {
-        let last = weights.channels() - 1;
-        Planes::from_fn(weights.width, weights.height, 1, |_, x, y| {
-            let (x, y) = (x as isize, y as isize);
-            let least = LEAST_ERROR * self.noise.at(0, x, y);
-            let biased = (0..last).map(|k| weights.at(k, x, y) * self.bias.at(k, x, y).max(least)).sum::<f32>();
-            CALIBRATION * (biased + weights.at(last, x, y) * self.variance.at(0, x, y))
         })
     }
 }

@@ -7,7 +7,8 @@
 //!
 //! Weights are at least zero and sum to one, so that no pixel is worse than the worst candidate. The sampled colours are the
 //! last candidate: they take the weight of images that differ from them by more than noise, which makes the error fall to
-//! zero whatever the network says. The estimated error of the last method's image is a feature, too.
+//! zero whatever the network says. The residual error of the last method's image is a feature, too; the error that this method itself
+//! claims is the result's, an upper bound.
 //!
 //! Mixtures of Fluxion's own images are no better than the best of them, `net`; so `blend` without Open Image Denoise is `net`.
 
@@ -91,6 +92,10 @@ impl Reconstruction for Blend {
         true
     }
 
+    fn guide(&self) -> Option<&dyn Reconstruction> {
+        self.methods.last().and_then(|(method, _)| method.guide())
+    }
+
     fn reconstruct(&self, frame: &Frame, context: &Context) -> Result<Solution> {
         check_memory(frame, context, METHOD.id, BYTES)?;
         let inputs = Inputs::new(frame, 1)?;
@@ -100,7 +105,7 @@ impl Reconstruction for Blend {
         }
         frame.require(Layer::Albedo)?;
         let pixels = (frame.width * frame.height) as u64;
-        let (mut candidates, mut best) = (Vec::new(), 0);
+        let (mut candidates, mut best, mut error) = (Vec::new(), 0, None);
         for (k, (method, notes)) in self.methods.iter().enumerate() {
             let share = 0.9 / self.methods.len() as f32;
             let report = |what: &str, done: f32| (context.progress)(what, (k as f32 + done) * share);
@@ -108,6 +113,7 @@ impl Reconstruction for Blend {
             let memory = context.memory.map(|memory| memory.saturating_sub(held));
             let solution = method.reconstruct(frame, &Context { progress: &report, memory, notes: true })?;
             best = candidates.len();
+            error = solution.error;
             candidates.push(solution.image);
             for name in *notes {
                 let note = solution.notes.iter().find(|note| note.name == *name);
@@ -121,7 +127,6 @@ impl Reconstruction for Blend {
         let evidence = Evidence::new(&inputs, &images, best)?;
         let weights = self.network.weights(&evidence.features(inputs.spp));
         let kept = if self.safety { evidence.safe(weights, inputs.spp) } else { weights };
-        let error = Some(inputs.error(&evidence.error(&kept)));
         let notes = if context.notes { notes(&kept, &inputs) } else { Vec::new() };
         Ok(Solution { image: mixed(&images, &kept, &inputs), alpha: None, error, notes })
     }

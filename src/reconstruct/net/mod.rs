@@ -75,6 +75,10 @@ impl Reconstruction for Net {
         true
     }
 
+    fn guide(&self) -> Option<&dyn Reconstruction> {
+        Some(self.frgr.as_ref())
+    }
+
     fn reconstruct(&self, frame: &Frame, context: &Context) -> Result<Solution> {
         check_memory(frame, context, METHOD.id, BYTES)?;
         let inputs = Inputs::new(frame, self.network.multiple())?;
