@@ -161,9 +161,13 @@ impl Run<'_> {
         self.journal.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
     }
 
+    /// Seconds that the method takes, if they are known.
+    fn known_duration(&self) -> Option<f64> {
+        self.times.method.or(self.settings.reconstruction.map(|known| known.as_secs_f64()))
+    }
+
     fn spent(&self) -> Spent {
-        let known = self.settings.reconstruction.map(|known| known.as_secs_f64());
-        let reconstruction = self.times.method.or(known).unwrap_or(0.0);
+        let reconstruction = self.known_duration().unwrap_or(0.0);
         let between = match self.settings.method.guide() {
             Some(_) => self.times.guide.unwrap_or(GUIDE_SHARE * reconstruction),
             None => reconstruction,
@@ -287,7 +291,7 @@ impl Run<'_> {
         let notes = self.journal().notes.clone();
         // A target is one of the method's own image; and to leave time for the last reconstruction it has to be measured once.
         let Limits { time, error, .. } = self.settings.limits;
-        let itself = error.is_some() || (time.is_some() && self.spent().reconstruction == 0.0);
+        let itself = error.is_some() || (time.is_some() && self.known_duration().is_none());
         let guided = self.settings.method.guide().is_some() && !itself;
         let decides = self.budget.by_error && notes.left > 0;
         let solution = if decides { Some(self.solve(&frame, guided)?) } else { None };
