@@ -71,7 +71,7 @@ pub struct Pass {
     pub spp: f64,
     /// Seconds since the start.
     pub seconds: f64,
-    /// Estimated relMSE of the image, if it was reconstructed.
+    /// Estimated relMSE of the image, if it was reconstructed, by the method or its guide.
     pub error: Option<f64>,
 }
 

@@ -7,8 +7,8 @@
 //!
 //! Weights are at least zero and sum to one, so that no pixel is worse than the worst candidate. The sampled colours are the
 //! last candidate: they take the weight of images that differ from them by more than noise, which makes the error fall to
-//! zero whatever the network says. The residual error of the last method's image is a feature, too; the error that this method itself
-//! claims is the result's, an upper bound.
+//! zero whatever the network says. The residual error of the last method's image is a feature, too; the error layer is
+//! that method's own.
 //!
 //! Mixtures of Fluxion's own images are no better than the best of them, `net`; so `blend` without Open Image Denoise is `net`.
 
