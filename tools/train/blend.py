@@ -71,8 +71,8 @@ def prepare(frame, names, network):
     trust = residual.trust(noise, bias, frame.spp)
     trust[-1] = 1
     frame.array = None
-    return {"images": images, "features": features, "trust": trust, "target": planes(frame.target), "noise": noise,
-            "bias": bias, "variance": variance, "spp": frame.spp, "name": frame.name, "frame": frame}
+    return {"images": images, "features": features, "trust": trust, "target": planes(frame.target),
+            "spp": frame.spp, "name": frame.name, "frame": frame}
 
 
 def weights(logits, trust):
@@ -132,18 +132,7 @@ def train(options):
     print(f"{len(training)} images to train on, {len(apart)} apart", flush=True)
     torch.manual_seed(options.seed)
     weigh = weigher(len(CANDIDATES[options.kind]))
-    optimiser = torch.optim.Adam(weigh.parameters(), RATE)
-    schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, RATE, options.steps)
-
-    def step_of(rng, _):
-        value = loss(weigh, crops(training, rng))
-        optimiser.zero_grad()
-        value.backward()
-        optimiser.step()
-        schedule.step()
-        return float(value.detach())
-
-    runs.train({"net": weigh, "optimiser": optimiser, "schedule": schedule}, step_of, options)
+    runs.descend(weigh, lambda rng: loss(weigh, crops(training, rng)), RATE, options)
 
 
 def trained(options):
@@ -152,21 +141,16 @@ def trained(options):
 
 def compared(weigh, names, apart):
     """Errors on the scenes kept apart, as a table: geometric means over those of the best single image. True if all are less."""
-    rows, calibration = {}, []
+    rows = {}
     for sample in apart:
         with torch.no_grad():
             kept = weights(weigh(sample["features"][None])[0], sample["trust"])
             image = (kept.unsqueeze(1) * sample["images"]).sum(0)
-            claimed = (kept[:-1] * torch.maximum(sample["bias"][:-1], residual.LEAST_ERROR * sample["noise"])).sum(0)
-            claimed += kept[-1] * sample["variance"][0]
         frame, last = sample["frame"], lambda planes: np.moveaxis(planes.numpy(), 0, -1)
         errors = [frame.rel_mse(last(sample["images"][k])) for k in range(len(names))] + [frame.rel_mse(last(image))]
         # The target's own noise, taken off on average, may be more than what is left.
         if min(errors) > frame.floor:
             rows.setdefault(sample["spp"], []).append(errors)
-        true = (image - sample["target"]) ** 2 - torch.from_numpy(np.moveaxis(0.25 * frame.difference ** 2, -1, 0))
-        relative = 1 / sample["divisor"]
-        calibration.append((float((true.mean(0) * relative[0]).mean()), float((claimed * relative[0]).mean())))
     print("| spp | frames | " + " | ".join(name or "colours" for name in names) + " | blend | over the best | worst |\n" + "|---" * (len(names) + 5) + "|")
     good = bool(rows)
     for spp in sorted(rows):
@@ -176,8 +160,6 @@ def compared(weigh, names, apart):
         worst = (errors[:, -1] / errors[:, :-1].min(1)).max()
         good &= ratio < 1
         print("| %d | %d | %s | %.2f | %.2f |" % (spp, len(errors), " | ".join("%.5f" % m for m in means), ratio, worst))
-    true, claimed = np.array(calibration).T
-    print("true over claimed error: %.2f in the geometric mean" % np.exp(np.log(np.maximum(true, 1e-7) / claimed).mean()))
     return good
 
 

@@ -177,19 +177,7 @@ def train(options):
     print(f"{len(training)} images to train on, {len(apart)} apart", flush=True)
     torch.manual_seed(options.seed)
     net = Network().to(memory_format=torch.channels_last)
-    optimiser = torch.optim.Adam(net.parameters(), RATE)
-    schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, RATE, options.steps)
-
-    def step_of(rng, _):
-        value = loss(net, crops(training, rng))
-        optimiser.zero_grad()
-        value.backward()
-        torch.nn.utils.clip_grad_norm_(net.parameters(), 1.0)
-        optimiser.step()
-        schedule.step()
-        return float(value.detach())
-
-    runs.train({"net": net, "optimiser": optimiser, "schedule": schedule}, step_of, options)
+    runs.descend(net, lambda rng: loss(net, crops(training, rng)), RATE, options, longest=1.0)
 
 
 def solved(net, features, images, variance, spp):

@@ -55,6 +55,25 @@ def train(parts, step_of, options):
                 saved = time.time()
 
 
+def descend(net, loss, rate, options, longest=None):
+    """Steps of Adam down `loss(rng)`, of a batch that it draws, by the one-cycle schedule. Longer gradients than `longest` are
+    cut to that length."""
+    optimiser = torch.optim.Adam(net.parameters(), rate)
+    schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, rate, options.steps)
+
+    def step_of(rng, _):
+        value = loss(rng)
+        optimiser.zero_grad()
+        value.backward()
+        if longest:
+            torch.nn.utils.clip_grad_norm_(net.parameters(), longest)
+        optimiser.step()
+        schedule.step()
+        return float(value.detach())
+
+    train({"net": net, "optimiser": optimiser, "schedule": schedule}, step_of, options)
+
+
 def trained(net, options, name="net"):
     """The network of a run, and its number of steps."""
     state = torch.load(state_path(options.run))
