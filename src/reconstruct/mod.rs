@@ -40,6 +40,13 @@ pub struct Solution {
     pub notes: Vec<Note>,
 }
 
+impl Solution {
+    /// The intermediate image of a name, if the method made one.
+    pub fn note(&self, name: &str) -> Option<&Image> {
+        self.notes.iter().find(|note| note.name == name).map(|note| &note.image)
+    }
+}
+
 /// An intermediate image.
 #[derive(Clone, Debug)]
 pub struct Note {

@@ -52,7 +52,7 @@ fn a_firefly_does_not_leave_the_range_around_it() {
     let at = 20 * 48 + 24;
     change(&mut frame, Layer::Color, |i, value| if i / 3 == at { value + 1e4 } else { value });
     let net = solved("net", &frame);
-    let frgr = &net.notes.iter().find(|note| note.name == "frgr").unwrap().image;
+    let frgr = net.note("frgr").unwrap();
     let largest = |x: usize, y: usize, image: &Image| image.rgb(x, y).to_array().into_iter().fold(0.0f32, f32::max);
     for (x, y) in (0..40usize).flat_map(|y| (0..48usize).map(move |x| (x, y))) {
         let window = (y.saturating_sub(2)..(y + 3).min(40))

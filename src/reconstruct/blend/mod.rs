@@ -113,12 +113,10 @@ impl Reconstruction for Blend {
             let memory = context.memory.map(|memory| memory.saturating_sub(held));
             let solution = method.reconstruct(frame, &Context { progress: &report, memory, notes: true })?;
             best = candidates.len();
+            let inner: Vec<Image> = notes.iter().filter_map(|name| solution.note(name).cloned()).collect();
             error = solution.error;
             candidates.push(solution.image);
-            for name in *notes {
-                let note = solution.notes.iter().find(|note| note.name == *name);
-                candidates.extend(note.map(|note| note.image.clone()));
-            }
+            candidates.extend(inner);
         }
         candidates.push(frame.require(Layer::Color)?.clone());
         (context.progress)("blend", 0.9);
@@ -179,10 +177,8 @@ mod tests {
     #[test]
     fn every_value_lies_among_those_of_the_candidates() {
         let frame = frame(&picture(SIZE), 0.3, 0.1, 1);
-        let note =
-            |solution: &Solution, name: &str| solution.notes.iter().find(|n| n.name == name).unwrap().image.clone();
         let [frgr, net] = ["frgr", "net"].map(|method| solved(parse(method).unwrap().as_ref(), &frame));
-        let inner = ["denoised", "level0_enhanced"].map(|name| note(&frgr, name));
+        let inner = ["denoised", "level0_enhanced"].map(|name| frgr.note(name).unwrap().clone());
         let colors = frame.get(Layer::Color).unwrap();
         let candidates = [&frgr.image, &inner[0], &inner[1], &net.image, &frgr.image, colors];
         for safety in [true, false] {

@@ -89,9 +89,8 @@ impl Reconstruction for Net {
         let [color, variance] = inputs.color()?;
         let mut images = vec![inputs.mirrored(&solution.image, inputs.scale)];
         for name in IMAGES {
-            let note = solution.notes.iter().find(|note| note.name == name);
-            let note = note.ok_or_else(|| Error::backend(METHOD.id, format!("frgr made no image {name}")))?;
-            images.push(inputs.mirrored(&note.image, inputs.scale));
+            let missing = || Error::backend(METHOD.id, format!("frgr made no image {name}"));
+            images.push(inputs.mirrored(solution.note(name).ok_or_else(missing)?, inputs.scale));
         }
         images.push(color.clone());
         let claimed = solution.error.as_ref().map(|error| inputs.mirrored(error, inputs.scale * inputs.scale));
