@@ -30,6 +30,8 @@ impl Plan {
         let edges = match scatters_light(scene) {
             // Known at no cost, whether or not the method asks; those of the ambient light have to be sampled.
             Err(_) if !wanted.ambient => EdgeNeed::KnownZero,
+            // Bins of edges go with those of colours where every sample has both.
+            _ if wanted.bins => wanted.with_every_difference().edges,
             _ => wanted.edges,
         };
         let needs = Needs { edges, alpha: scene.sensor().wants_alpha(), ..wanted };
@@ -76,6 +78,9 @@ fn of_film(scene: &Scene, method: Needs, saved: Needs, needs: Needs) -> Vec<Item
         Item { name, computed, reason: reason.to_owned() }
     };
     let mut gradients = item("gradients", needs.edges.is_sampled(), method.edges.is_on(), saved.edges.is_on());
+    if needs.edges == EdgeNeed::Thinned {
+        gradients.reason += ", in fewer samples where they cost most";
+    }
     let wanted = method.union(saved).edges.is_on();
     if let (true, false, Err(reason)) = (wanted, needs.edges.is_sampled(), scatters_light(scene)) {
         gradients.reason = reason.to_owned();

@@ -192,7 +192,7 @@ fn read(from: &mut impl Read, length: u64) -> io::Result<Checkpoint> {
     let elapsed = Duration::try_from_secs_f64(header.seconds).map_err(|error| invalid(error.to_string()))?;
     // Reasons are for the user's eyes: one that this version would not give is still one.
     let first_rejected = header.rejected.map(|(id, reason)| (id, Rejected::named(&reason)));
-    let outcome = RenderOutcome { spp: film.fewest_samples(), film, elapsed, stopped: false, first_rejected };
+    let outcome = RenderOutcome { elapsed, first_rejected, ..RenderOutcome::of(film) };
     Ok(Checkpoint { origin: header.origin, outcome, journal })
 }
 

@@ -63,6 +63,11 @@ impl Film {
         &mut self.tiles
     }
 
+    /// Number of tiles.
+    pub fn tiles(&self) -> usize {
+        self.tiles.len()
+    }
+
     /// Samples of all pixels.
     pub fn samples(&self) -> u64 {
         self.tiles.iter().map(Tile::samples).sum()

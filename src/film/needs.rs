@@ -33,14 +33,16 @@ pub enum EdgeNeed {
     Off,
     /// The scene scatters no light, so every difference is zero: nothing is sampled, and frames hold zeros.
     KnownZero,
-    /// They are sampled by shifted paths.
+    /// They are sampled by shifted paths, in fewer samples where that is costly.
+    Thinned,
+    /// They are sampled by shifted paths, in every sample.
     Sampled,
 }
 
 impl EdgeNeed {
     /// Whether paths have to be shifted.
     pub fn is_sampled(self) -> bool {
-        self == Self::Sampled
+        self >= Self::Thinned
     }
 
     /// Whether frames have differences, sampled or not.
@@ -77,6 +79,12 @@ impl Needs {
         let counts = size_of::<u32>() * (1 + usize::from(self.edges.is_sampled()));
         let recorded = STATISTICS.iter().filter(|statistic| (statistic.recorded)(self) && statistic.sparse.is_none());
         counts + recorded.map(|statistic| size_of::<f32>() * statistic.stride()).sum::<usize>()
+    }
+
+    /// The same, with sampled differences in every sample.
+    pub fn with_every_difference(self) -> Self {
+        let edges = if self.edges.is_sampled() { EdgeNeed::Sampled } else { self.edges };
+        Self { edges, ..self }
     }
 
     /// Whether everything that `other` asks for is recorded.

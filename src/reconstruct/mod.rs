@@ -82,7 +82,7 @@ pub trait Reconstruction: Send + Sync {
         false
     }
 
-    /// The quicker method whose estimated error this one has, if there is one: it serves between passes of adaptive sampling.
+    /// A quicker method with much the same error, if there is one: it serves between passes of adaptive sampling.
     fn guide(&self) -> Option<&dyn Reconstruction> {
         None
     }

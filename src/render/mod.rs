@@ -4,6 +4,7 @@
 //! schedule (tiles, rounds) -> wave -+- tracer: camera, direct, emission, continuation -> record
 //!                                   +- gradient: shift mappings -> differences of the record's samples
 //!                                   +- seen: emitters at the ends of camera rays -> their light in the samples
+//!                                   +- thinning: which samples come with differences
 //! ```
 
 mod camera;
@@ -17,6 +18,7 @@ mod record;
 mod sampler;
 mod schedule;
 mod seen;
+mod thinning;
 mod tracer;
 mod vertices;
 mod wave;

@@ -4,6 +4,7 @@ use super::continuation::Shaded;
 use super::emission::{self, EmitterHit};
 use super::features::{self, FeatureWalk};
 use super::paths::Packet;
+use super::thinning::Work;
 use super::vertices::{Emission, Vertices};
 use crate::film::Sample;
 use crate::math::Rgb;
@@ -21,6 +22,8 @@ pub struct PathRecord {
     pub samples: Vec<Sample>,
     /// Number of leading vertices of every path up to the last one that receives light.
     pub lit_length: Vec<u32>,
+    /// Work of the latest wave.
+    pub work: Work,
     walks: Vec<FeatureWalk>,
 }
 
@@ -35,6 +38,7 @@ impl PathRecord {
         reset(&mut self.lit_length, count);
         reset(&mut self.walks, count);
         self.packets.clear();
+        self.work = Work::default();
     }
 
     /// Adds the radiance of emitters that paths have hit by scattering, or seen from the camera: surfaces, or the

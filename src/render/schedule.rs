@@ -9,8 +9,9 @@ use rayon::prelude::*;
 use super::SampleId;
 use super::gradient::Shift;
 use super::seen::{self, Grids};
+use super::thinning::Shares;
 use super::wave::Wave;
-use crate::film::{Film, Needs, Rejected, Sample, TILE, Tile};
+use crate::film::{EdgeNeed, Film, Needs, Rejected, Sample, TILE, Tile};
 use crate::scene::Scene;
 
 /// Limit of a render.
@@ -85,13 +86,27 @@ pub struct RenderOutcome {
     pub stopped: bool,
     /// The first sample that was not finite, for `--replay`.
     pub first_rejected: Option<(SampleId, Rejected)>,
+    /// Findings about the tiles; made again when a film is read from a file.
+    pub(crate) choices: Choices,
+}
+
+/// Findings about every tile, made when they are first needed and kept for the whole render.
+pub(crate) struct Choices {
+    grids: Grids,
+    shares: Shares,
 }
 
 impl RenderOutcome {
     /// An empty film.
     pub fn new(scene: &Scene, needs: Needs) -> Self {
-        let film = Film::new(scene.sensor().width, scene.sensor().height, needs);
-        Self { film, spp: 0, elapsed: Duration::ZERO, stopped: false, first_rejected: None }
+        Self::of(Film::new(scene.sensor().width, scene.sensor().height, needs))
+    }
+
+    /// A film with its samples, as if no time had been spent on it.
+    pub(crate) fn of(film: Film) -> Self {
+        let choices = Choices { grids: Grids::new(film.tiles()), shares: Shares::new(film.tiles()) };
+        let spp = film.fewest_samples();
+        Self { film, spp, elapsed: Duration::ZERO, stopped: false, first_rejected: None, choices }
     }
 }
 
@@ -107,7 +122,6 @@ pub fn render(scene: &Scene, settings: RenderSettings, control: &Control) -> Ren
 /// have the same bits as without the interruption.
 pub fn resume(scene: &Scene, settings: RenderSettings, control: &Control, mut outcome: RenderOutcome) -> RenderOutcome {
     outcome.stopped = false;
-    let grids = Grids::new(outcome.film.tiles_mut().len());
     while let (false, Some(round)) = (outcome.stopped, next_round(settings.budget, outcome.spp, outcome.elapsed)) {
         let (done, elapsed, start) = (outcome.spp, outcome.elapsed, Instant::now());
         let progress = |share: f32| match settings.budget {
@@ -117,7 +131,7 @@ pub fn resume(scene: &Scene, settings: RenderSettings, control: &Control, mut ou
             }
         };
         let control = Control { progress: &progress, ..*control };
-        run_round((scene, &grids), settings, &control, &mut outcome, &|_, _| done + round);
+        run_round(scene, settings, &control, &mut outcome, &|_, _| done + round);
     }
     if let Some(sink) = control.sink {
         sink.save(&outcome);
@@ -133,8 +147,8 @@ pub fn render_to_counts(
     outcome: &mut RenderOutcome,
     goals: &[u32],
 ) {
-    let (width, grids) = (outcome.film.width, Grids::new(outcome.film.tiles_mut().len()));
-    run_round((scene, &grids), settings, control, outcome, &|x, y| goals[y * width + x]);
+    let width = outcome.film.width;
+    run_round(scene, settings, control, outcome, &|x, y| goals[y * width + x]);
 }
 
 /// Samples per pixel of the next round, none when the budget is used up. A time budget is met by the rounds' own
@@ -156,13 +170,7 @@ fn next_round(budget: Budget, done: u32, elapsed: Duration) -> Option<u32> {
 type Goals<'a> = &'a (dyn Fn(usize, usize) -> u32 + Sync);
 
 /// Renders a round, with pauses for checkpoints.
-fn run_round(
-    scene: (&Scene, &Grids),
-    settings: RenderSettings,
-    control: &Control,
-    outcome: &mut RenderOutcome,
-    goals: Goals,
-) {
+fn run_round(scene: &Scene, settings: RenderSettings, control: &Control, outcome: &mut RenderOutcome, goals: Goals) {
     let (before, start) = (outcome.elapsed, Instant::now());
     let mut paused = true;
     while paused {
@@ -179,7 +187,7 @@ fn run_round(
 /// Renders tiles up to their goals, until a checkpoint is due, which returns true. `control.progress` is called with the
 /// share of finished tiles.
 fn run_tiles(
-    (scene, grids): (&Scene, &Grids),
+    scene: &Scene,
     settings: RenderSettings,
     control: &Control,
     outcome: &mut RenderOutcome,
@@ -195,7 +203,7 @@ fn run_tiles(
             return;
         }
         let before = tile.samples();
-        if let Some(rejected) = run_tile(settings, wave, (tile, number), grids, (goals, control.stop)) {
+        if let Some(rejected) = run_tile(settings, wave, (tile, number), &outcome.choices, (goals, control.stop)) {
             let mut first = first_rejected.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
             first.get_or_insert(rejected);
         }
@@ -220,7 +228,7 @@ fn run_tile(
     settings: RenderSettings,
     wave: &mut Wave,
     (tile, number): (&mut Tile, usize),
-    grids: &Grids,
+    choices: &Choices,
     (goals, stop): (Goals, &AtomicBool),
 ) -> Option<(SampleId, Rejected)> {
     let mut first_rejected = None;
@@ -234,7 +242,7 @@ fn run_tile(
     let due = || spans.iter().filter(|span| !span.is_empty());
     let (start, end) = (due().map(|span| span.start).min()?, due().map(|span| span.end).max()?);
     let all: Vec<_> = (0..spans.len()).map(|pixel| tile.pixel(pixel)).collect();
-    let all_cells = grids.get(number, || seen::grids(wave.scene(), &all));
+    let all_cells = choices.grids.get(number, || seen::grids(wave.scene(), &all));
     let (mut numbers, mut pixels, mut cells) = (Vec::new(), Vec::new(), Vec::new());
     for index in start..end {
         if index - start >= SOON && stop.load(Ordering::Relaxed) {
@@ -246,12 +254,21 @@ fn run_tile(
         pixels.extend(numbers.iter().map(|&pixel| all[pixel]));
         cells.clear();
         cells.extend(numbers.iter().filter_map(|&pixel| all_cells.get(pixel).copied()));
-        let samples = wave.trace(settings.seed, settings.first + index, &pixels, &cells);
+        let id = (settings.seed, settings.first + index);
+        let differences = settings.needs.edges != EdgeNeed::Thinned
+            || choices.shares.has_differences(number, id.1, || {
+                wave.trace((settings.seed, 0), &all, &[], true);
+                wave.work()
+            });
+        let samples = wave.trace(id, &pixels, &cells, differences);
         for ((&pixel, &(x, y)), sample) in numbers.iter().zip(&pixels).zip(samples) {
             if let Err(reason) = tile.add(pixel, sample) {
                 first_rejected
                     .get_or_insert((SampleId { seed: settings.seed, x, y, index: settings.first + index }, reason));
             }
+        }
+        if id.1 == 0 && pixels.len() == all.len() {
+            choices.shares.learn(number, wave.work());
         }
     }
     first_rejected
@@ -263,7 +280,7 @@ pub fn sample(scene: &Scene, id: SampleId, shift: Shift) -> Sample {
     let (width, height) = (TILE.min(scene.sensor().width - x), TILE.min(scene.sensor().height - y));
     let pixels: Vec<_> = (0..width * height).map(|pixel| (x + pixel % width, y + pixel / width)).collect();
     let grids = seen::grids(scene, &pixels);
-    Wave::new(scene, Needs::ALL, shift).trace(id.seed, id.index, &pixels, &grids)[(id.y - y) * width + id.x - x]
+    Wave::new(scene, Needs::ALL, shift).trace((id.seed, id.index), &pixels, &grids, true)[(id.y - y) * width + id.x - x]
 }
 
 #[cfg(test)]

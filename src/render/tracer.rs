@@ -37,6 +37,7 @@ impl<'a> PathTracer<'a> {
         let mut depth = 0;
         while self.paths.len() > 0 {
             record.packets.push(self.paths.len().div_ceil(LANES));
+            record.work.paths += self.paths.len() as f32;
             let level = if keep_all { depth } else { 0 };
             self.advance(camera.sampler, depth as u32, (level, keep_all), record);
             std::mem::swap(&mut self.paths, &mut self.next);

@@ -5,6 +5,7 @@ use super::features;
 use super::gradient::{Shift, ShiftMapping};
 use super::record::PathRecord;
 use super::seen;
+use super::thinning::Work;
 use super::tracer::PathTracer;
 use crate::film::{Differences, Needs, Sample};
 use crate::math::lanes::LANES;
@@ -38,13 +39,20 @@ impl<'a> Wave<'a> {
         self.tracer.scene
     }
 
-    /// Sample number `index` of some pixels, in their order. `grids`: the number of cells along a pixel's side over which
-    /// directly seen light is averaged, for every pixel; empty for single rays.
-    pub fn trace(&mut self, seed: u64, index: u32, pixels: &[(usize, usize)], grids: &[u32]) -> &[Sample] {
+    /// Sample number `index` of some pixels, in their order, with or without `differences` if the film records them. `grids`: the
+    /// number of cells along a pixel's side over which directly seen light is averaged, for every pixel; empty for single rays.
+    pub fn trace(
+        &mut self,
+        (seed, index): (u64, u32),
+        pixels: &[(usize, usize)],
+        grids: &[u32],
+        differences: bool,
+    ) -> &[Sample] {
         let camera = CameraSamples::new(self.tracer.scene, seed, index, pixels);
-        let keep_all = self.shift.as_ref().is_some_and(|shift| shift.needs_vertices());
+        let mut shift = self.shift.as_mut().filter(|_| differences);
+        let keep_all = shift.as_ref().is_some_and(|shift| shift.needs_vertices());
         self.tracer.trace(&camera, Vec2::ZERO, keep_all, &mut self.record);
-        if let Some(shift) = &mut self.shift {
+        if let Some(shift) = &mut shift {
             self.record.samples.iter_mut().for_each(|sample| sample.differences = Some(Differences::default()));
             shift.shift(&mut self.tracer, &camera, &mut self.record);
         }
@@ -61,5 +69,10 @@ impl<'a> Wave<'a> {
             }
         }
         &self.record.samples
+    }
+
+    /// Work of the latest wave.
+    pub fn work(&self) -> Work {
+        self.record.work
     }
 }

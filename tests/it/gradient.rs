@@ -2,7 +2,7 @@
 //! can be undone.
 
 use crate::common::{bundled, check_zero, film, shifted_film};
-use fluxion::film::{Layer, Needs};
+use fluxion::film::{EdgeNeed, Frame, Layer, Needs};
 use fluxion::image::Image;
 use fluxion::math::lanes::Lanes3;
 use fluxion::math::{Vec3, rng, vec2, vec3};
@@ -133,6 +133,29 @@ fn correlation_makes_gradients_far_less_noisy_than_colours() {
     let frame = film(&scene, 64, 1, Needs::ALL).develop();
     let sum = |layer| frame.get(layer).unwrap().data.iter().map(|&v| f64::from(v)).sum::<f64>();
     assert!(sum(Layer::DxVariance) < 0.15 * 2.0 * sum(Layer::ColorVariance));
+}
+
+#[test]
+fn differences_are_left_out_where_they_are_costly_and_stay_right() {
+    let scene = bundled("glass-caustic", (64, 48));
+    let thinned = Needs { edges: EdgeNeed::Thinned, ..Needs::EDGES };
+    let [few, all] = [thinned, Needs::EDGES].map(|needs| film(&scene, 47, 1, needs).develop());
+    // Colours do not know of differences.
+    assert_eq!(few.get(Layer::Color), all.get(Layer::Color));
+    // The first eight, then one, two or all of every three.
+    let counts = &few.get(Layer::EdgeSamples).unwrap().data;
+    assert!(counts.iter().all(|count| [8.0 + 13.0, 8.0 + 26.0, 47.0].contains(count)));
+    let mean = counts.iter().sum::<f32>() / counts.len() as f32;
+    assert!((21.0..44.0).contains(&mean), "{mean}");
+    // The same differences within the noise of both, and that much more noise.
+    let of = |frame: &Frame, layer| frame.get(layer).unwrap().data.iter().map(|&v| f64::from(v)).sum::<f64>();
+    let noise = (of(&few, Layer::DxVariance) + of(&all, Layer::DxVariance)).sqrt();
+    let apart = (of(&few, Layer::Dx) - of(&all, Layer::Dx)).abs();
+    assert!(apart < 4.0 * noise, "{apart} {noise}");
+    // Where they cost little, nearly all samples have them.
+    let frame = film(&bundled("door-ajar", (64, 48)), 47, 1, thinned).develop();
+    let cheap = frame.get(Layer::EdgeSamples).map_or(47.0, |counts| counts.data.iter().sum::<f32>() / 64.0 / 48.0);
+    assert!(cheap > 43.0, "{cheap}");
 }
 
 fn direction(i: u64) -> Vec3 {

@@ -9,7 +9,7 @@ use crate::common::{bundled, film};
 use assert_cmd::Command;
 use fluxion::adaptive::{self, ALLOCATORS, AdaptiveSettings, Limits, Start};
 use fluxion::checkpoint::{self, Origin, Run};
-use fluxion::film::{Film, Layer, Needs};
+use fluxion::film::{EdgeNeed, Film, Layer, Needs};
 use fluxion::image::Image;
 use fluxion::reconstruct::{self, Context};
 use fluxion::render::Shift;
@@ -34,6 +34,9 @@ fn origin(scene: &Scene, seed: u64, needs: Needs) -> Origin {
         runs: vec![Run { seed, first: 0, samples: 0 }],
     }
 }
+
+/// Everything, with differences where they pay.
+const THINNED: Needs = Needs { edges: EdgeNeed::Thinned, ..Needs::ALL };
 
 /// Keeps a render after every so many tiles, and stops it after some of the times.
 struct Interruption<'a> {
@@ -80,16 +83,16 @@ fn interrupted<T>(
 fn a_render_that_is_resumed_has_the_bits_of_one_that_is_not() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.ckpt");
-    for name in ["cornell-box", "glossy-metal"] {
+    for (name, needs) in [("cornell-box", Needs::ALL), ("glossy-metal", Needs::ALL), ("glossy-metal", THINNED)] {
         let scene = bundled(name, (50, 40));
-        let straight = film(&scene, 21, 7, Needs::ALL);
-        let origin = origin(&scene, 7, Needs::ALL);
+        let straight = film(&scene, 21, 7, needs);
+        let origin = origin(&scene, 7, needs);
         let keep = |outcome: &RenderOutcome| checkpoint::save(&path, &origin, outcome, None).unwrap();
         let resumed: Film = interrupted(
             &path,
             |kept, control| {
-                let begun = kept.map_or_else(|| RenderOutcome::new(&scene, Needs::ALL), |kept| kept.outcome);
-                let outcome = resume(&scene, settings(21, Needs::ALL), control, begun);
+                let begun = kept.map_or_else(|| RenderOutcome::new(&scene, needs), |kept| kept.outcome);
+                let outcome = resume(&scene, settings(21, needs), control, begun);
                 (outcome.film, outcome.stopped)
             },
             &keep,
@@ -144,24 +147,28 @@ fn an_adaptive_run_that_is_resumed_makes_the_same_decisions() {
 
 #[test]
 fn films_of_quarters_are_the_film_of_the_whole() {
-    let scene = bundled("unit/occluder", (20, 17));
-    let quarter = |first: u32, seed: u64| {
-        let settings = RenderSettings { first, seed, ..settings(9, Needs::ALL) };
+    let scenes = [("unit/occluder", Needs::ALL), ("glossy-metal", THINNED)];
+    let [occluder, metal] = scenes.map(|(name, needs)| (bundled(name, (20, 17)), needs));
+    let quarter = |(scene, needs): &(Scene, Needs), first: u32, seed: u64| {
+        let settings = RenderSettings { first, seed, ..settings(9, *needs) };
         let control = Control::QUIET;
-        render(&scene, settings, &control).film
+        render(scene, settings, &control).film
     };
     // The same samples in parts that are no whole number of bins: equal up to rounding.
-    let whole = quarter_sum((0..4).map(|k| quarter(9 * k, 7)));
-    let straight = film(&scene, 36, 7, Needs::ALL);
-    let (a, b) = (whole.develop(), straight.develop());
-    for (layer, a) in a.present() {
-        let b = b.get(layer).unwrap();
-        let most = b.data.iter().fold(0.0f32, |most, value| most.max(value.abs()));
-        let close = |(a, b): (&f32, &f32)| (a - b).abs() <= 1e-5 * most;
-        assert!(a.data.iter().zip(&b.data).all(close), "{}", layer.name());
-    }
+    let straight = [&occluder, &metal].map(|scene| {
+        let whole = quarter_sum((0..4).map(|k| quarter(scene, 9 * k, 7))).develop();
+        let at_once = film(&scene.0, 36, 7, scene.1).develop();
+        for (layer, a) in whole.present() {
+            let b = at_once.get(layer).unwrap();
+            let most = b.data.iter().fold(0.0f32, |most, value| most.max(value.abs()));
+            let close = |(a, b): (&f32, &f32)| (a - b).abs() <= 1e-5 * most;
+            assert!(a.data.iter().zip(&b.data).all(close), "{}", layer.name());
+        }
+        at_once
+    });
     // Other samples: the same mean and variance within the noise of both.
-    let other = quarter_sum((0..4).map(|seed| quarter(0, 100 + seed))).develop();
+    let b = &straight[0];
+    let other = quarter_sum((0..4).map(|seed| quarter(&occluder, 0, 100 + seed))).develop();
     let sum = |image: &Image| image.data.iter().map(|&value| f64::from(value)).sum::<f64>();
     let of = |layer| (sum(other.get(layer).unwrap()), sum(b.get(layer).unwrap()));
     let ((mean, expected), (variance, expected_variance)) = (of(Layer::Color), of(Layer::ColorVariance));
@@ -343,7 +350,7 @@ fn a_killed_program_goes_on_where_it_was() {
     let code = signalled(folder.path(), "-0", 0, &arguments);
     assert_eq!(code, Some(0));
     let scene = bundled("cornell-box", (64, 64));
-    let needs = Needs { features: true, ..Needs::EDGES };
+    let needs = reconstruct::parse(reconstruct::DEFAULT).unwrap().needs();
     let kept = checkpoint::load(&folder.path().join("a.ckpt")).unwrap().outcome.film;
     assert!(kept == film(&scene, 200, 0, needs));
 }

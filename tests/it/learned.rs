@@ -39,7 +39,8 @@ fn corrections_that_samples_deny_are_taken_back() {
     // Colours that are all but certain leave no room for what the network believes.
     let truth = picture((48, 40));
     let frame = noisy(&truth, Noise { color: 1e-3, edge: 3e-4, distribution: Distribution::Normal }, 4);
-    let [safe, frgr, free] = ["net", "frgr", "net:safety=off"].map(|method| mse(&solved(method, &frame).image, &truth));
+    let [safe, frgr, free] =
+        ["net:image=safe", "frgr", "net:image=network"].map(|method| mse(&solved(method, &frame).image, &truth));
     assert!(
         safe < 4.0 * frgr.max(1e-7) && free > 4.0 * safe,
         "net {safe:.1e}, frgr {frgr:.1e}, without the rule {free:.1e}"
@@ -51,7 +52,7 @@ fn a_firefly_does_not_leave_the_range_around_it() {
     let mut frame = frame((48, 40), 0.2, 5);
     let at = 20 * 48 + 24;
     change(&mut frame, Layer::Color, |i, value| if i / 3 == at { value + 1e4 } else { value });
-    let net = solved("net", &frame);
+    let net = solved("net:image=safe", &frame);
     let frgr = net.note("frgr").unwrap();
     let largest = |x: usize, y: usize, image: &Image| image.rgb(x, y).to_array().into_iter().fold(0.0f32, f32::max);
     for (x, y) in (0..40usize).flat_map(|y| (0..48usize).map(move |x| (x, y))) {

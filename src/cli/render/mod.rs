@@ -88,6 +88,9 @@ pub struct Args {
     /// How paths are shifted to neighbouring pixels
     #[arg(long, default_value = SHIFTS[0].id, value_parser = shift_names(), hide_short_help = true)]
     shift: String,
+    /// Samples in which paths are shifted
+    #[arg(long, default_value = "auto", value_enum, hide_short_help = true, value_name = "WHEN")]
+    differences: Shifted,
     /// Roughness above which `reconnect` connects paths at a material instead of copying half vectors
     #[arg(long, value_name = "ALPHA", hide_short_help = true)]
     shift_threshold: Option<f32>,
@@ -106,6 +109,15 @@ enum Planned {
     Needed,
     /// Everything that can be recorded.
     All,
+}
+
+/// Samples in which paths are shifted.
+#[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
+enum Shifted {
+    /// Fewer where that is costly, for methods that ask for no more.
+    Auto,
+    /// All.
+    Always,
 }
 
 fn parse_sample(text: &str) -> Result<(usize, usize, u32), String> {
@@ -134,10 +146,14 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     if scene.emitters().is_empty() {
         note!("warning: nothing in {} emits light: the image is black", args.scene.display());
     }
+    let needed = match args.differences {
+        Shifted::Always => method.needs().with_every_difference(),
+        Shifted::Auto => method.needs(),
+    };
     let saved = match &args.layers {
         Some(_) => Needs {
             features: true,
-            edges: method.needs().edges,
+            edges: needed.edges,
             bins: args.bins,
             occlusion: args.occlusion,
             position: args.position,
@@ -147,7 +163,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         None => Needs::default(),
     };
     let plan = match args.plan {
-        Planned::Needed => Plan::new(&scene, method.needs(), saved),
+        Planned::Needed => Plan::new(&scene, needed, saved),
         Planned::All => {
             scene.disable_fast_paths();
             Plan::all(&scene)

@@ -35,6 +35,12 @@ impl<const N: usize> Mask<N> {
         self.0.iter().fold(0, |all, lane| all | lane) != 0
     }
 
+    /// Number of lanes it holds for.
+    #[inline(always)]
+    pub fn count(self) -> u32 {
+        self.0.iter().map(|lane| lane & 1).sum()
+    }
+
     /// The lanes it holds for.
     #[inline(always)]
     pub fn lanes(self) -> impl Iterator<Item = usize> {

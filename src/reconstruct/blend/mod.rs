@@ -54,7 +54,8 @@ const CANDIDATE: u64 = 12;
 /// Methods, and those of their intermediate images that are candidates beside their own.
 type Candidates = &'static [(&'static str, &'static [&'static str])];
 
-const CANDIDATES: Candidates = &[("frgr:denoiser=oidn", &["denoised", "level0_enhanced"]), ("net", &["frgr"])];
+const CANDIDATES: Candidates =
+    &[("frgr:denoiser=oidn", &["denoised", "level0_enhanced"]), ("net:image=safe", &["frgr"])];
 
 /// The trained network for these.
 const WEIGHTS: &[u8] = include_bytes!("oidn.safetensors");
@@ -70,7 +71,7 @@ fn make(parameters: &Parameters) -> Result<Box<dyn Reconstruction>> {
     if parameters.switch("oidn")? {
         return Ok(Box::new(Blend::new(CANDIDATES, safety)?));
     }
-    parse(if safety { "net" } else { "net:safety=off" })
+    parse(if safety { "net" } else { "net:image=network" })
 }
 
 impl Blend {
@@ -160,7 +161,7 @@ mod tests {
     const SIZE: (usize, usize) = (48, 40);
 
     /// As with Open Image Denoise, whose place non-local means take.
-    const STAND_IN: Candidates = &[("frgr", &["denoised", "level0_enhanced"]), ("net", &["frgr"])];
+    const STAND_IN: Candidates = &[("frgr", &["denoised", "level0_enhanced"]), ("net:image=safe", &["frgr"])];
 
     fn frame(truth: &Image, noise: f32, edge: f32, seed: u64) -> Frame {
         noisy(truth, Noise { color: noise, edge, distribution: Distribution::Normal }, seed)
@@ -177,7 +178,7 @@ mod tests {
     #[test]
     fn every_value_lies_among_those_of_the_candidates() {
         let frame = frame(&picture(SIZE), 0.3, 0.1, 1);
-        let [frgr, net] = ["frgr", "net"].map(|method| solved(parse(method).unwrap().as_ref(), &frame));
+        let [frgr, net] = ["frgr", "net:image=safe"].map(|method| solved(parse(method).unwrap().as_ref(), &frame));
         let inner = ["denoised", "level0_enhanced"].map(|name| frgr.note(name).unwrap().clone());
         let colors = frame.get(Layer::Color).unwrap();
         let candidates = [&frgr.image, &inner[0], &inner[1], &net.image, &frgr.image, colors];

@@ -4,6 +4,7 @@ use super::form::Form;
 use super::level::Level;
 use crate::error::{Error, Result};
 use crate::film::{Frame, Layer};
+use crate::image::Image;
 use crate::image::nl_means::rdfc::{self, Denoised};
 use crate::image::nl_means::{Guide, Guides};
 use crate::image::oidn;
@@ -11,6 +12,7 @@ use crate::reconstruct::features::Feature;
 use crate::reconstruct::inputs::Inputs;
 use crate::reconstruct::oidn::clean;
 use crate::reconstruct::residual::{noise, squared_error};
+use crate::reconstruct::{Context, parse};
 
 /// A choice of the denoised image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,6 +21,8 @@ pub enum Denoiser {
     Rdfc,
     /// Open Image Denoise.
     Oidn,
+    /// The trained network of `net`.
+    Net,
 }
 
 impl std::str::FromStr for Denoiser {
@@ -28,31 +32,34 @@ impl std::str::FromStr for Denoiser {
     fn from_str(text: &str) -> Result<Self> {
         match text {
             "oidn" => oidn::check().map(|()| Self::Oidn),
+            "net" => Ok(Self::Net),
             _ => Ok(Self::Rdfc),
         }
     }
 }
 
-/// Denoises the colour without gradients, `rows` rows at a time where that is possible.
+/// Denoises the colour, by non-local means `rows` rows at a time.
 pub fn denoise(
     denoiser: Denoiser,
     (level, form): (&Level, Form),
     (inputs, frame): (&Inputs, &Frame),
     rows: usize,
-    progress: &dyn Fn(f32),
+    context: &Context,
 ) -> Result<Denoised> {
+    // The level's variances may have been raised, which makes the error less.
+    let judged = |image: Image| {
+        let image = inputs.mirrored(&image, inputs.scale);
+        Denoised { error: squared_error(&level.color, &noise(&level.variance), &image), image }
+    };
     match denoiser {
         Denoiser::Rdfc => {
             let color = Guide { mean: level.color.clone(), variance: level.variance.sum(), tolerance: None };
             let guides = Guides { color, features: level.features.iter().map(Feature::guide).collect() };
             let (window, choice) = (form.window(), form.choice());
             let options = rdfc::Options { window, symmetric: form == Form::Code, choice, rows };
-            Ok(rdfc::denoise(&guides, options, progress))
+            Ok(rdfc::denoise(&guides, options, &|share| (context.progress)("denoise", share)))
         }
-        Denoiser::Oidn => {
-            let image = inputs.mirrored(&clean(frame, true, frame.get(Layer::Direct))?, inputs.scale);
-            // The level's variances may have been raised, which makes the error less.
-            Ok(Denoised { error: squared_error(&level.color, &noise(&level.variance), &image), image })
-        }
+        Denoiser::Oidn => clean(frame, true, frame.get(Layer::Direct)).map(judged),
+        Denoiser::Net => parse("net:image=safe")?.reconstruct(frame, context).map(|solution| judged(solution.image)),
     }
 }

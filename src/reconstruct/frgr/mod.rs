@@ -31,7 +31,7 @@ use super::features::{Feature, Kind};
 use super::inputs::{Inputs, too_little};
 use super::{Context, EdgeTrust, Method, Note, Parameter, Parameters, Reconstruction, Solution, Traits};
 use crate::error::{Error, Result};
-use crate::film::{Frame, Needs};
+use crate::film::{EdgeNeed, Frame, Needs};
 use crate::image::Image;
 use crate::image::nl_means::rdfc::Denoised;
 use crate::image::planes::Planes;
@@ -58,7 +58,7 @@ pub const METHOD: Method = Method {
         parameter(
             "denoiser",
             "rdfc",
-            "of that image: `rdfc`, non-local means, or `oidn`, Open Image Denoise, if installed",
+            "of that image: `rdfc`, non-local means, `net`, or `oidn`, Open Image Denoise, if installed",
         ),
         parameter("enhance", "on", "whether gradients are weighted by their worth, `on` or `off`"),
     ],
@@ -93,14 +93,15 @@ fn make(parameters: &Parameters) -> Result<Box<dyn Reconstruction>> {
         guided: resample == "glu",
         features,
         denoised: parameters.switch("denoised")?,
-        denoiser: parameters.choice("denoiser", &["rdfc", "oidn"])?.parse()?,
+        denoiser: parameters.choice("denoiser", &["rdfc", "oidn", "net"])?.parse()?,
         enhance: parameters.switch("enhance")?,
     }))
 }
 
-/// Floats held for every pixel besides the frame while levels are worked on, and while a band is denoised: upper bounds;
-/// 160 were measured in all.
+/// Floats held for every pixel besides the frame while levels are worked on, of the finest level while another method denoises
+/// it, and while a band is denoised: upper bounds; 160 were measured in all.
 const LEVEL_FLOATS: u64 = 170;
+const HELD_FLOATS: u64 = 40;
 const BAND_FLOATS: u64 = 45;
 
 /// A band that is worked on has at least so many rows.
@@ -115,8 +116,8 @@ struct Prepared {
 
 impl Reconstruction for Frgr {
     fn needs(&self) -> Needs {
-        let features = !self.features.is_empty() || self.denoiser == Denoiser::Oidn;
-        Needs { features, ..Needs::EDGES }
+        let features = !self.features.is_empty() || self.denoiser != Denoiser::Rdfc;
+        Needs { features, edges: EdgeNeed::Thinned, ..Needs::default() }
     }
 
     fn estimates_error(&self) -> bool {
@@ -132,8 +133,11 @@ impl Reconstruction for Frgr {
         notes.add("dx", &level.gradients[0], inputs.scale);
         notes.add("dy", &level.gradients[1], inputs.scale);
         (context.progress)("denoise", 0.1);
-        let report = |share| (context.progress)("denoise", 0.1 + 0.35 * share);
-        let denoised = denoise(self.denoiser, (&level, self.form), (&inputs, frame), rows, &report)?;
+        let report = |_: &str, share: f32| (context.progress)("denoise", 0.1 + 0.35 * share);
+        let held = HELD_FLOATS * 4 * (inputs.width * inputs.height) as u64;
+        let memory = context.memory.map(|memory| memory.saturating_sub(held));
+        let context = Context { progress: &report, memory, notes: false };
+        let denoised = denoise(self.denoiser, (&level, self.form), (&inputs, frame), rows, &context)?;
         notes.add("denoised", &denoised.image, inputs.scale);
         let Denoised { image, error } = denoised;
         (context.progress)("pyramid", 0.45);

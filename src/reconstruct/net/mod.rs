@@ -3,11 +3,12 @@
 //!
 //! ```text
 //! frame ─ frgr ─ images ─┬─ features ─ U-Net ─ weights, correction ─┐
-//!                        └──────────────────── sum by weights ──────┴─ safety rule ─ result
+//!                        └──────────────────── sum by weights ──────┴─ safety rule ─ safe image ─ frgr ─ result
 //! ```
 //!
-//! The result is pulled back to `frgr` where it differs from the sampled colours by more than noise, so that the error goes on
-//! falling with the number of samples.
+//! The safe image is pulled back to `frgr` where it differs from the sampled colours by more than noise. At the end `frgr` filters the
+//! colours once more, held near the safe image in place of its own denoised one: so the error goes on falling with the number
+//! of samples.
 
 mod features;
 
@@ -23,12 +24,12 @@ use crate::nn::{Tensor, UNet, Weights};
 /// `net`.
 pub const METHOD: Method = Method {
     id: "net",
-    summary: "frgr, corrected by a trained network; consistent",
+    summary: "frgr, held near what a trained network makes of it; consistent",
     traits: Traits { edges: EdgeTrust::ByVariance, ..Traits::FILTER },
     parameters: &[Parameter {
-        name: "safety",
-        default: "on",
-        summary: "whether corrections that differ from the samples by more than noise are taken back",
+        name: "image",
+        default: "filtered",
+        summary: "`network`, its own; `safe`, where the samples allow it; or `filtered`, colours by frgr near that",
     }],
     make,
 };
@@ -63,7 +64,35 @@ struct Net {
 fn make(parameters: &Parameters) -> Result<Box<dyn Reconstruction>> {
     let network = Weights::parse(WEIGHTS).and_then(|weights| UNet::new(&weights, HALVINGS));
     let network = network.map_err(|why| Error::backend(METHOD.id, why))?;
-    Ok(Box::new(Net { frgr: parse("frgr")?, network, safety: parameters.switch("safety")? }))
+    let frgr = parse("frgr")?;
+    Ok(match parameters.choice("image", &["network", "safe", "filtered"])?.as_ref() {
+        "filtered" => Box::new(Filtered { method: parse("frgr:denoiser=net")?, guide: frgr }),
+        image => Box::new(Net { frgr, network, safety: image == "safe" }),
+    })
+}
+
+/// `frgr` near the network's image.
+struct Filtered {
+    method: Box<dyn Reconstruction>,
+    guide: Box<dyn Reconstruction>,
+}
+
+impl Reconstruction for Filtered {
+    fn needs(&self) -> Needs {
+        self.method.needs()
+    }
+
+    fn estimates_error(&self) -> bool {
+        self.method.estimates_error()
+    }
+
+    fn guide(&self) -> Option<&dyn Reconstruction> {
+        Some(self.guide.as_ref())
+    }
+
+    fn reconstruct(&self, frame: &Frame, context: &Context) -> Result<Solution> {
+        self.method.reconstruct(frame, context)
+    }
 }
 
 impl Reconstruction for Net {

@@ -29,6 +29,7 @@ impl ShiftMapping for Replay {
     fn shift(&mut self, tracer: &mut PathTracer, camera: &CameraSamples, record: &mut PathRecord) {
         for (direction, step) in CROSS.into_iter().enumerate() {
             tracer.trace(camera, vec2(step.0 as f32, step.1 as f32), false, &mut self.neighbours);
+            record.work.offsets += self.neighbours.work.paths;
             let samples = record.samples.iter_mut().zip(&self.neighbours.samples).zip(camera.pixels);
             for ((sample, neighbour), &pixel) in samples {
                 let Some(differences) = &mut sample.differences else { continue };

@@ -20,7 +20,7 @@ mod states;
 use self::direct::sampled_emitters;
 use self::offsets::{MISS, OUT_OF_FILM, OffsetSurfaces};
 use self::segment::{NextVertices, OffsetSegment, Scratch, ShiftContext};
-use self::states::{LevelStates, Prefix, States};
+use self::states::{Kind, LevelStates, Prefix, States};
 use super::{ShiftKind, ShiftMapping};
 use crate::film::CROSS;
 use crate::math::Rgb;
@@ -36,6 +36,11 @@ pub const SHIFT: ShiftKind = ShiftKind {
     summary: "join the base path where it scatters diffusely",
     make: |threshold, ambient| Box::new(Reconnect { threshold, ambient, ..Reconnect::default() }),
 };
+
+/// Costs of connecting and of extending an offset, in rays of paths (fitted to fourteen scenes): connections are made in packets,
+/// extensions one by one.
+const CONNECTION: f32 = 0.4;
+const EXTENSION: f32 = 1.8;
 
 /// The shift mapping with the memory that it keeps between waves.
 #[derive(Default)]
@@ -90,6 +95,9 @@ impl ShiftMapping for Reconnect {
             }
             std::mem::swap(&mut self.states, &mut self.next);
         }
+        let Scratch { connected, extended, .. } = &mut self.scratch;
+        record.work.offsets +=
+            CONNECTION * std::mem::take(connected) as f32 + EXTENSION * std::mem::take(extended) as f32;
     }
 }
 
@@ -169,6 +177,7 @@ fn shift_segment(
     let Step { context, vertices, next, active, direction } = *step;
     scratch.load_offsets(context, offsets, (for_light, for_scatter), active);
     let lit = active & vertices.lit & for_light.inside();
+    scratch.connected += (lit & for_light.are(Kind::Unconnected)).count();
     let sampled =
         if lit.any() { sampled_emitters(context, vertices, scratch.offset(), for_light, lit) } else { Lanes3::ZERO };
     let ambient = if context.ambient { active } else { Mask::NONE };

@@ -44,6 +44,9 @@ pub struct NextVertices {
 pub struct Scratch {
     offset: SurfacePacket,
     extensions: Vec<(usize, Option<Extension>)>,
+    /// Offsets that were connected so far, and that were extended: each takes a ray.
+    pub connected: u32,
+    pub extended: u32,
 }
 
 impl ShiftContext<'_> {
@@ -149,7 +152,7 @@ impl<'a> OffsetSegment<'a> {
         states: &'a States,
         leaving: Mask,
     ) -> Self {
-        let Scratch { offset, extensions } = scratch;
+        let Scratch { offset, extensions, connected, extended } = scratch;
         let unconnected = leaving & states.are(Kind::Unconnected);
         let diffuse = context.diffuse(vertices.materials.roughness()) & context.diffuse(offset.materials.roughness());
         let connectable = unconnected & diffuse & vertices.scatters.are(Lobe::Smooth);
@@ -158,6 +161,8 @@ impl<'a> OffsetSegment<'a> {
             let (base, offset) = (vertices.surfaces.get(lane), offset.surfaces.get(lane));
             extensions.push((lane, context.extend(&base, &vertices.scatters.get(lane), &offset)));
         }
+        *connected += connectable.count();
+        *extended += extensions.len() as u32;
         let base_scatter = base_scatter(context.scene, vertices, states, leaving);
         Self { vertices, offset, states, leaving, unconnected, base_scatter, connectable, extensions }
     }
