@@ -3,12 +3,12 @@
 //!
 //! ```text
 //! frame ─ frgr ─ images ─┬─ features ─ U-Net ─ weights, correction ─┐
-//!                        └──────────────────── sum by weights ──────┴─ safety rule ─ safe image ─ frgr ─ result
+//!                        └──────────────────── sum by weights ──────┴─ safety rule ─ safe image (─ frgr) ─ result
 //! ```
 //!
-//! The safe image is pulled back to `frgr` where it differs from the sampled colours by more than noise. At the end `frgr` filters the
-//! colours once more, held near the safe image in place of its own denoised one: so the error goes on falling with the number
-//! of samples.
+//! The safe image is pulled back to `frgr` where it differs from the sampled colours by more than noise, so that the error goes on
+//! falling with the number of samples. With few samples `frgr` filters the colours once more, held near the safe image in place of
+//! its own denoised one.
 
 mod features;
 
@@ -24,18 +24,26 @@ use crate::nn::{Tensor, UNet, Weights};
 /// `net`.
 pub const METHOD: Method = Method {
     id: "net",
-    summary: "frgr, held near what a trained network makes of it; consistent",
+    summary: "frgr, corrected by a trained network; consistent",
     traits: Traits { edges: EdgeTrust::ByVariance, ..Traits::FILTER },
     parameters: &[Parameter {
         name: "image",
-        default: "filtered",
-        summary: "`network`, its own; `safe`, where the samples allow it; or `filtered`, colours by frgr near that",
+        default: "auto",
+        summary: "`network`, its own; `safe`, where samples allow it; `filtered`, colours by frgr near that; `auto`, by samples",
     }],
     make,
 };
 
 /// The trained network.
 const WEIGHTS: &[u8] = include_bytes!("net.safetensors");
+
+/// Method of the filtered image.
+const FILTERED: &str = "frgr:denoiser=net";
+
+/// Number of samples up to which the filtered image is better, and least share of it that is worth its time. With many samples
+/// frgr's filter blurs what the network has kept.
+const FILTERED_SAMPLES: f32 = 32.0;
+const LEAST_SHARE: f32 = 0.1;
 
 /// Intermediate images of `frgr` that the network mixes with its result.
 const IMAGES: [&str; 2] = ["denoised", "level0_enhanced"];
@@ -64,34 +72,48 @@ struct Net {
 fn make(parameters: &Parameters) -> Result<Box<dyn Reconstruction>> {
     let network = Weights::parse(WEIGHTS).and_then(|weights| UNet::new(&weights, HALVINGS));
     let network = network.map_err(|why| Error::backend(METHOD.id, why))?;
-    let frgr = parse("frgr")?;
-    Ok(match parameters.choice("image", &["network", "safe", "filtered"])?.as_ref() {
-        "filtered" => Box::new(Filtered { method: parse("frgr:denoiser=net")?, guide: frgr }),
-        image => Box::new(Net { frgr, network, safety: image == "safe" }),
+    let image = parameters.choice("image", &["auto", "network", "safe", "filtered"])?;
+    let net = Net { frgr: parse("frgr")?, network, safety: image != "network" };
+    Ok(match image.as_ref() {
+        "filtered" => parse(FILTERED)?,
+        "auto" => Box::new(Auto { safe: net, filtered: parse(FILTERED)? }),
+        _ => Box::new(net),
     })
 }
 
-/// `frgr` near the network's image.
-struct Filtered {
-    method: Box<dyn Reconstruction>,
-    guide: Box<dyn Reconstruction>,
+/// The filtered image with few samples, the safe one with many, and mixtures between.
+struct Auto {
+    safe: Net,
+    filtered: Box<dyn Reconstruction>,
 }
 
-impl Reconstruction for Filtered {
+impl Reconstruction for Auto {
     fn needs(&self) -> Needs {
-        self.method.needs()
+        self.safe.needs()
     }
 
     fn estimates_error(&self) -> bool {
-        self.method.estimates_error()
+        true
     }
 
     fn guide(&self) -> Option<&dyn Reconstruction> {
-        Some(self.guide.as_ref())
+        self.safe.guide()
     }
 
     fn reconstruct(&self, frame: &Frame, context: &Context) -> Result<Solution> {
-        self.method.reconstruct(frame, context)
+        let share = (FILTERED_SAMPLES / Inputs::new(frame, 1)?.spp).powi(2).min(1.0);
+        if share < LEAST_SHARE {
+            return self.safe.reconstruct(frame, context);
+        }
+        let mut solution = self.filtered.reconstruct(frame, &Context { notes: true, ..*context })?;
+        if let Some(safe) = solution.notes.iter().find(|note| note.name == "denoised") {
+            let values = solution.image.data.iter_mut().zip(&safe.image.data);
+            values.for_each(|(value, safe)| *value = safe + share * (*value - safe));
+        }
+        if !context.notes {
+            solution.notes.clear();
+        }
+        Ok(solution)
     }
 }
 
