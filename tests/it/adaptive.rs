@@ -64,6 +64,8 @@ fn a_guide_decides_and_the_image_is_the_methods() {
     let (own, guide) = (whole(net.as_ref()), whole(net.guide().unwrap()));
     assert_eq!(outcome.solution.image, own.image);
     assert_ne!(own.image, guide.image);
+    // The error of the safe image is the guide's to the bit, that of the filtered one much the same.
+    assert_eq!(whole(reconstruct::parse("net:image=safe").unwrap().as_ref()).error, guide.error);
     let claimed = |solution: &Solution| solution.error.as_ref().unwrap().data.iter().sum::<f32>();
     let ratio = claimed(&own) / claimed(&guide);
     assert!((0.25..4.0).contains(&ratio), "{ratio}");
