@@ -14,6 +14,7 @@ mod emission;
 mod features;
 pub mod gradient;
 mod paths;
+mod per_tile;
 mod record;
 mod sampler;
 mod schedule;

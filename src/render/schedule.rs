@@ -8,7 +8,8 @@ use rayon::prelude::*;
 
 use super::SampleId;
 use super::gradient::Shift;
-use super::seen::{self, Grids};
+use super::per_tile::PerTile;
+use super::seen;
 use super::thinning::Shares;
 use super::wave::Wave;
 use crate::film::{EdgeNeed, Film, Needs, Rejected, Sample, TILE, Tile};
@@ -92,7 +93,8 @@ pub struct RenderOutcome {
 
 /// Findings about every tile, made when they are first needed and kept for the whole render.
 pub(crate) struct Choices {
-    grids: Grids,
+    /// Result of [`seen::grids`].
+    grids: PerTile<Vec<u32>>,
     shares: Shares,
 }
 
@@ -104,7 +106,7 @@ impl RenderOutcome {
 
     /// A film with its samples, as if no time had been spent on it.
     pub(crate) fn of(film: Film) -> Self {
-        let choices = Choices { grids: Grids::new(film.tiles()), shares: Shares::new(film.tiles()) };
+        let choices = Choices { grids: PerTile::new(film.tiles()), shares: Shares::new(film.tiles()) };
         let spp = film.fewest_samples();
         Self { film, spp, elapsed: Duration::ZERO, stopped: false, first_rejected: None, choices }
     }

@@ -1,8 +1,6 @@
 //! Emitters that the camera sees, by rays of their own where they vary within pixels. At the edges of luminaires and windows
 //! most of the error would be theirs, and such rays end at the first surface.
 
-use std::sync::OnceLock;
-
 use super::camera::CameraSamples;
 use crate::film::Sample;
 use crate::math::lanes::{Bits, LANES, Lanes, Mask};
@@ -18,21 +16,6 @@ const LARGEST_GRID: u32 = 4;
 const USUAL_DEVIATION: f32 = 0.5;
 /// Cells along a pixel's side that are looked at to decide.
 const PROBES: u32 = 2;
-
-/// The results of [`grids`] for the tiles of a film, found when they are first asked for.
-pub struct Grids(Vec<OnceLock<Vec<u32>>>);
-
-impl Grids {
-    /// Results of a number of tiles, none of them known.
-    pub fn new(tiles: usize) -> Self {
-        Self((0..tiles).map(|_| OnceLock::new()).collect())
-    }
-
-    /// The result of one tile; `find` finds it.
-    pub fn get(&self, tile: usize, find: impl FnOnce() -> Vec<u32>) -> &[u32] {
-        self.0[tile].get_or_init(find)
-    }
-}
 
 /// A cell of a pixel: the pixel's position in the list, the number of cells along its side, the cell's own number.
 type Cell = (usize, u32, u32);

@@ -1,6 +1,6 @@
 //! Differences where they pay: in how many of every three samples a tile takes them, by what they cost there.
 
-use std::sync::OnceLock;
+use super::per_tile::PerTile;
 
 /// Samples of a pixel that come with differences whatever they cost: with fewer nothing is known of their variances.
 const FIRST: u32 = 8;
@@ -38,22 +38,22 @@ fn share(work: Work) -> u32 {
 
 /// The shares of the tiles of a film, found when they are first needed. They depend on scene and seed alone, so that samples stay
 /// the same in whatever order and on whatever machine they are taken.
-pub struct Shares(Vec<OnceLock<u32>>);
+pub struct Shares(PerTile<u32>);
 
 impl Shares {
     /// Shares of a number of tiles, none of them known.
     pub fn new(tiles: usize) -> Self {
-        Self((0..tiles).map(|_| OnceLock::new()).collect())
+        Self(PerTile::new(tiles))
     }
 
     /// Tells the work of a tile's samples of number zero.
     pub fn learn(&self, tile: usize, work: Work) {
-        self.0[tile].get_or_init(|| share(work));
+        self.0.get(tile, || share(work));
     }
 
     /// Whether sample `number` of a tile comes with differences; `find` finds the work of samples number zero if it is not known.
     pub fn has_differences(&self, tile: usize, number: u32, find: impl FnOnce() -> Work) -> bool {
-        number < FIRST || number % OF < *self.0[tile].get_or_init(|| share(find()))
+        number < FIRST || number % OF < *self.0.get(tile, || share(find()))
     }
 }
 
