@@ -65,6 +65,11 @@ impl Weights {
         }
     }
 
+    /// Whether there is an array of this name.
+    pub fn has(&self, name: &str) -> bool {
+        self.0.contains_key(name)
+    }
+
     /// An array of height, width and channels.
     pub fn tensor(&self, name: &str) -> Option<Tensor> {
         let array = self.0.get(name)?;

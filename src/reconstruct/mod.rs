@@ -2,12 +2,14 @@
 
 mod apr;
 mod blend;
+mod compressed;
 mod control_variate;
 mod edge_means;
 mod feature;
 mod features;
 mod frgr;
 mod generated;
+mod gradnet;
 mod inputs;
 mod l1;
 mod l2;
@@ -165,6 +167,7 @@ pub const METHODS: &[Method] = &[
     l1::METHOD,
     control_variate::METHOD,
     least_trimmed::METHOD,
+    gradnet::METHOD,
     nlm::METHOD,
     rdfc::METHOD,
     nfor::METHOD,

@@ -1,4 +1,4 @@
-//! `net`: a trained network on frames whose truth is known.
+//! `net` and `gradnet`: trained networks on frames whose truth is known.
 
 use fluxion::film::{Frame, Layer};
 use fluxion::image::Image;
@@ -25,12 +25,12 @@ fn mse(image: &Image, truth: &Image) -> f64 {
 #[test]
 fn errors_are_those_that_are_claimed() {
     let truth = picture((61, 45));
-    for noise in [0.4, 0.1] {
-        let solutions = [1, 2, 3].map(|seed| solved("net", &frame((61, 45), noise, seed)));
+    for (method, noise) in [("net", 0.4), ("net", 0.1), ("gradnet", 0.4), ("gradnet", 0.1)] {
+        let solutions = [1, 2, 3].map(|seed| solved(method, &frame((61, 45), noise, seed)));
         let error = solutions.iter().map(|solution| mse(&solution.image, &truth)).sum::<f64>() / 3.0;
         let claims = solutions.iter().flat_map(|solution| solution.error.as_ref().unwrap().data.iter());
         let claimed = claims.map(|&claim| f64::from(claim)).sum::<f64>() / (3.0 * truth.data.len() as f64);
-        assert!((0.2..5.0).contains(&(claimed / error)), "{claimed:.2e} for {error:.2e}");
+        assert!((0.2..5.0).contains(&(claimed / error)), "{method}: {claimed:.2e} for {error:.2e}");
     }
 }
 
@@ -62,4 +62,16 @@ fn a_firefly_does_not_leave_the_range_around_it() {
         // Half of the luminance is allowed beyond, and a twentieth of the typical one.
         assert!(largest(x, y, &net.image) <= 2.5 * most + 0.2, "{x},{y}: {:?}", net.image.rgb(x, y));
     }
+}
+
+#[test]
+fn weights_of_gradnet_come_from_a_file_of_either_preset() {
+    let frame = frame((48, 40), 0.2, 6);
+    let solution = solved("gradnet:weights=tests/data/gradnet-printed.safetensors,means=off", &frame);
+    assert!(solution.image.not_finite().is_none());
+    assert_ne!(solution.image, solved("gradnet:means=off", &frame).image);
+    let why = |file: &str| parse(&format!("gradnet:weights={file}")).err().unwrap().to_string();
+    assert!(why("nowhere.safetensors").contains("nowhere.safetensors"));
+    assert!(why("tests/data/nn.safetensors").contains("nn.safetensors: lacks the array data.0.weight"));
+    assert!(why("src/reconstruct/net/net.safetensors").contains("net.safetensors: lacks the array"));
 }

@@ -35,7 +35,7 @@ INPUTS, OUTPUTS, SLOPE = 19, MIXED + 3, 0.01
 DARK = 0.1
 # Radius of the window of frgr's image whose values bound the result, room beyond them, over its luminance, and number of samples
 # up to which these bounds stay.
-REACH, ROOM, FEW = 2, 0.5, 16
+REACH, ROOM, FEW = 2, 0.5, 32
 # Logit of frgr among the images before training.
 START = 4.0
 CROP, BATCH, RATE, STEPS = 96, 4, 1e-3, 16000

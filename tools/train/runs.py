@@ -1,5 +1,6 @@
 """Training runs: steps that can be interrupted and resumed, with a log; a step is the same whenever it is taken."""
 import csv
+import math
 import os
 import time
 
@@ -34,7 +35,7 @@ def train(parts, step_of, options):
     os.makedirs(options.run, exist_ok=True)
     path, step = state_path(options.run), 0
     if os.path.exists(path):
-        state = torch.load(path)
+        state = torch.load(path, map_location="cpu")
         step = state["step"]
         for name, part in parts.items():
             part.load_state_dict(state[name])
@@ -45,9 +46,10 @@ def train(parts, step_of, options):
             values.append(step_of(np.random.default_rng([options.seed, step]), step))
             step += 1
             if step % 200 == 0:
-                log.writerow([step, "%.5f" % np.mean(values)])
+                mean = np.mean([float(value) for value in values])
+                log.writerow([step, "%.5f" % mean])
                 file.flush()
-                print(step, "%.4f" % np.mean(values), flush=True)
+                print(step, "%.4f" % mean, flush=True)
                 values = []
             if time.time() - saved > 60 or step == options.steps:
                 torch.save({"step": step, **{name: part.state_dict() for name, part in parts.items()}}, path + ".part")
@@ -55,11 +57,17 @@ def train(parts, step_of, options):
                 saved = time.time()
 
 
-def descend(net, loss, rate, options, longest=None):
-    """Steps of Adam down `loss(rng)`, of a batch that it draws, by the one-cycle schedule. Longer gradients than `longest` are
-    cut to that length."""
+def cosine(steps, first=500):
+    """Factors of a learning rate that rises over the `first` steps and falls to zero at the last."""
+    return lambda step: min(1.0, step / first) * 0.5 * (1 + math.cos(math.pi * min(1.0, step / steps)))
+
+
+def descend(net, loss, rate, options, longest=None, factors=None):
+    """Steps of Adam down `loss(rng)`, of a batch that it draws, by the one-cycle schedule or with `factors` of the rate by the
+    step. Longer gradients than `longest` are cut to that length."""
     optimiser = torch.optim.Adam(net.parameters(), rate)
-    schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, rate, options.steps)
+    schedules = torch.optim.lr_scheduler
+    schedule = schedules.LambdaLR(optimiser, factors) if factors else schedules.OneCycleLR(optimiser, rate, options.steps)
 
     def step_of(rng, _):
         value = loss(rng)
@@ -69,13 +77,13 @@ def descend(net, loss, rate, options, longest=None):
             torch.nn.utils.clip_grad_norm_(net.parameters(), longest)
         optimiser.step()
         schedule.step()
-        return float(value.detach())
+        return value.detach()
 
     train({"net": net, "optimiser": optimiser, "schedule": schedule}, step_of, options)
 
 
 def trained(net, options, name="net"):
     """The network of a run, and its number of steps."""
-    state = torch.load(state_path(options.run))
+    state = torch.load(state_path(options.run), map_location="cpu")
     net.load_state_dict(state[name])
     return net, state["step"]

@@ -1,9 +1,10 @@
-//! A trained U-Net that corrects the image of `frgr`. What it adds is learned from other scenes; frames and gradients speak through
-//! `frgr` and its intermediate images.
+//! Two trained networks that correct the image of `frgr`; what they add is learned from other scenes. A U-Net sees that image, its
+//! intermediate ones and features, the other network sampled differences, too. What both get wrong differs, so that the mean of
+//! both has less error than either.
 //!
 //! ```text
-//! frame ─ frgr ─ images ─┬─ features ─ U-Net ─ weights, correction ─┐
-//!                        └──────────────────── sum by weights ──────┴─ safety rule ─ safe image (─ frgr) ─ result
+//! frame ─ frgr ─ images ─┬─ U-Net ───┬─ mean ─ bounds ─ safety rule ─ safe image (─ frgr) ─ result
+//!   └──── differences ───┴─ GradNet ─┘
 //! ```
 //!
 //! The safe image is pulled back to `frgr` where it differs from the sampled colours by more than noise, so that the error goes on
@@ -13,29 +14,31 @@
 mod features;
 
 use self::features::{DARK, features};
+use super::compressed::{compress, decompress, given};
 use super::inputs::{Inputs, check_memory};
 use super::residual::{mean, noise, squared_error, trust, windowed};
 use super::{Context, EdgeTrust, Method, Note, Parameter, Parameters, Reconstruction, Solution, Traits, parse};
 use crate::error::{Error, Result};
 use crate::film::{Frame, Needs};
 use crate::image::planes::Planes;
-use crate::nn::{Tensor, UNet, Weights};
+use crate::nn::{GradNet, Tensor, UNet, Weights};
 
 /// `net`.
 pub const METHOD: Method = Method {
     id: "net",
-    summary: "frgr, corrected by a trained network; consistent",
+    summary: "frgr, corrected by trained networks; consistent",
     traits: Traits { edges: EdgeTrust::ByVariance, ..Traits::FILTER },
     parameters: &[Parameter {
         name: "image",
         default: "auto",
-        summary: "`network`, its own; `safe`, where samples allow it; `filtered`, colours by frgr near that; `auto`, by samples",
+        summary: "`network`, the networks' own; `safe`, where samples allow it; `filtered`, colours by frgr near that; `auto`, by samples",
     }],
     make,
 };
 
-/// The trained network.
+/// The trained networks: one that is shown no differences but what `frgr` made of them, and one that is.
 const WEIGHTS: &[u8] = include_bytes!("net.safetensors");
+const WITH_DIFFERENCES: &[u8] = include_bytes!("differences.safetensors");
 
 /// Method of the filtered image.
 const FILTERED: &str = "frgr:denoiser=net";
@@ -52,7 +55,7 @@ const IMAGES: [&str; 2] = ["denoised", "level0_enhanced"];
 /// up to which these bounds stay; with more they close in on `frgr`.
 const REACH: usize = 2;
 const ROOM: f32 = 0.5;
-const FEW: f32 = 16.0;
+const FEW: f32 = 32.0;
 
 /// How often the network halves the image.
 const HALVINGS: usize = 4;
@@ -61,19 +64,22 @@ const HALVINGS: usize = 4;
 const ROWS: usize = 128;
 
 /// Bytes held for every pixel besides the frame, an upper bound.
-const BYTES: u64 = 700;
+const BYTES: u64 = 900;
 
 struct Net {
     frgr: Box<dyn Reconstruction>,
     network: UNet,
+    with_differences: GradNet,
     safety: bool,
 }
 
 fn make(parameters: &Parameters) -> Result<Box<dyn Reconstruction>> {
-    let network = Weights::parse(WEIGHTS).and_then(|weights| UNet::new(&weights, HALVINGS));
-    let network = network.map_err(|why| Error::backend(METHOD.id, why))?;
+    let broken = |why| Error::backend(METHOD.id, why);
+    let network = Weights::parse(WEIGHTS).and_then(|weights| UNet::new(&weights, HALVINGS)).map_err(broken)?;
+    let with_differences =
+        Weights::parse(WITH_DIFFERENCES).and_then(|weights| GradNet::new(&weights)).map_err(broken)?;
     let image = parameters.choice("image", &["auto", "network", "safe", "filtered"])?;
-    let net = Net { frgr: parse("frgr")?, network, safety: image != "network" };
+    let net = Net { frgr: parse("frgr")?, network, with_differences, safety: image != "network" };
     Ok(match image.as_ref() {
         "filtered" => parse(FILTERED)?,
         "auto" => Box::new(Auto { safe: net, filtered: parse(FILTERED)? }),
@@ -146,8 +152,13 @@ impl Reconstruction for Net {
         images.push(color.clone());
         let claimed = solution.error.as_ref().map(|error| inputs.mirrored(error, inputs.scale * inputs.scale));
         let claimed = claimed.unwrap_or_else(|| variance.clone());
-        let output = self.network.apply(&features(&inputs, &images, &claimed)?, ROWS);
-        let corrected = corrected(&images, &output, inputs.spp);
+        let by_images = corrected(&images, &self.network.apply(&features(&inputs, &images, &claimed)?, ROWS));
+        (context.progress)("differences", 0.8);
+        let claimed = mean(&claimed).map(|error| error.max(0.0).sqrt());
+        let shown: Vec<_> = images.iter().collect();
+        let output = self.with_differences.apply(&given(&inputs, &shown, &[&claimed], true)?);
+        let both = by_images.zip(&moved(&images[0], &output), |one, other| 0.5 * (one + other));
+        let corrected = bounded(&images[0], &both, (FEW / inputs.spp).min(1.0).powi(2));
         (context.progress)("safety", 0.95);
         let noise = noise(&variance);
         let image = if self.safety {
@@ -172,18 +183,12 @@ impl Reconstruction for Net {
     }
 }
 
-/// Images by the network's weights, and its correction relative to the first one's luminance; within what that has around.
-fn corrected(images: &[Planes], output: &Tensor, spp: f32) -> Planes {
-    let share = (FEW / spp).min(1.0).powi(2);
+/// Images by the network's weights, and its correction relative to the first one's luminance.
+fn corrected(images: &[Planes], output: &Tensor) -> Planes {
     let luminance = mean(&images[0]).map(|luminance| luminance.max(0.0) + DARK);
     Planes::from_fn(output.width, output.height, 3, |c, x, y| {
         let (scores, correction) = output.pixel(x, y).split_at(IMAGES.len() + 1);
         let largest = scores.iter().fold(f32::NEG_INFINITY, |largest, score| largest.max(*score));
-        let around = |at: usize, length: usize| at.saturating_sub(REACH)..(at + REACH + 1).min(length);
-        let window = around(y, output.height).flat_map(|y| around(x, output.width).map(move |x| (x, y)));
-        let values = window.map(|(x, y)| images[0].at(c, x as isize, y as isize));
-        let (least, most) =
-            values.fold((f32::INFINITY, f32::NEG_INFINITY), |(a, b), value| (value.min(a), value.max(b)));
         let (x, y) = (x as isize, y as isize);
         let (mut sum, mut total) = (0.0, 0.0);
         for (image, score) in images.iter().zip(scores) {
@@ -191,9 +196,30 @@ fn corrected(images: &[Planes], output: &Tensor, spp: f32) -> Planes {
             sum += weight * image.at(c, x, y);
             total += weight;
         }
-        let (unit, own) = (luminance.at(0, x, y), images[0].at(c, x, y));
-        let bound = |extreme: f32, room: f32| own + share * share * (extreme - own) + share * room;
-        (sum / total + unit * correction[c]).clamp(bound(least, -ROOM * unit), bound(most, ROOM * unit))
+        sum / total + luminance.at(0, x, y) * correction[c]
+    })
+}
+
+/// The image, moved by what the network that is shown differences says of its compressed values.
+fn moved(image: &Planes, output: &Tensor) -> Planes {
+    Planes::from_fn(output.width, output.height, 3, |c, x, y| {
+        decompress(compress(image.at(c, x as isize, y as isize)) + output.pixel(x, y)[c]).max(0.0)
+    })
+}
+
+/// The corrected image, within what frgr has around, and no further from frgr than a `share` of that with many samples.
+fn bounded(frgr: &Planes, corrected: &Planes, share: f32) -> Planes {
+    let luminance = mean(frgr).map(|luminance| luminance.max(0.0) + DARK);
+    Planes::from_fn(frgr.width, frgr.height, 3, |c, x, y| {
+        let around = |at: usize, length: usize| at.saturating_sub(REACH)..(at + REACH + 1).min(length);
+        let window = around(y, frgr.height).flat_map(|y| around(x, frgr.width).map(move |x| (x, y)));
+        let values = window.map(|(x, y)| frgr.at(c, x as isize, y as isize));
+        let (least, most) =
+            values.fold((f32::INFINITY, f32::NEG_INFINITY), |(a, b), value| (value.min(a), value.max(b)));
+        let (x, y) = (x as isize, y as isize);
+        let (room, own) = (share * ROOM * luminance.at(0, x, y), frgr.at(c, x, y));
+        let bound = |extreme: f32, room: f32| own + share * share * (extreme - own) + room;
+        corrected.at(c, x, y).clamp(bound(least, -room), bound(most, room))
     })
 }
 
@@ -201,11 +227,25 @@ fn corrected(images: &[Planes], output: &Tensor, spp: f32) -> Planes {
 mod tests {
     use super::*;
 
+    fn vectors(bytes: &[u8], names: [&str; 4]) -> [Tensor; 4] {
+        let vectors = Weights::parse(bytes).unwrap();
+        names.map(|name| vectors.tensor(name).unwrap())
+    }
+
+    fn planes(tensor: &Tensor, first: usize) -> Planes {
+        Planes::from_fn(tensor.width, tensor.height, 3, |c, x, y| tensor.pixel(x, y)[first + c])
+    }
+
+    /// Largest difference, over one more than what is expected.
+    fn worst(made: &Planes, expected: &Planes) -> f32 {
+        let difference = made.zip(expected, |made, expected| (made - expected).abs() / (1.0 + expected.abs()));
+        difference.to_image(made.width, made.height, 1.0).data.into_iter().fold(0.0, f32::max)
+    }
+
     #[test]
     fn images_are_those_of_pytorch() {
-        let vectors = Weights::parse(include_bytes!("../../../tests/data/net.safetensors")).unwrap();
-        let [features, images, logits, output] =
-            ["features", "images", "logits", "output"].map(|name| vectors.tensor(name).unwrap());
+        let bytes = include_bytes!("../../../tests/data/net.safetensors");
+        let [features, images, logits, output] = vectors(bytes, ["features", "images", "logits", "output"]);
         let network = UNet::new(&Weights::parse(WEIGHTS).unwrap(), HALVINGS).unwrap();
         assert_eq!((network.inputs(), network.multiple()), (features.channels, 16));
         let made = network.apply(&features, ROWS);
@@ -213,13 +253,19 @@ mod tests {
         for (made, expected) in made.data.iter().zip(&logits.data) {
             assert!((made - expected).abs() < 1e-5 * largest, "{made} instead of {expected}");
         }
-        let planes = |tensor: &Tensor, first: usize| {
-            Planes::from_fn(tensor.width, tensor.height, 3, |c, x, y| tensor.pixel(x, y)[first + c])
-        };
         let images: Vec<_> = (0..images.channels / 3).map(|k| planes(&images, 3 * k)).collect();
-        let (made, expected) = (corrected(&images, &made, 2.0 * FEW), planes(&output, 0));
-        let difference = made.zip(&expected, |made, expected| (made - expected).abs() / (1.0 + expected.abs()));
-        let worst = difference.to_image(output.width, output.height, 1.0).data.into_iter().fold(0.0, f32::max);
+        let worst = worst(&bounded(&images[0], &corrected(&images, &made), 0.25), &planes(&output, 0));
+        assert!(worst < 1e-5, "{worst:.1e}");
+    }
+
+    #[test]
+    fn images_with_differences_are_those_of_pytorch() {
+        let bytes = include_bytes!("../../../tests/data/net-differences.safetensors");
+        let [data, gradient, image, output] = vectors(bytes, ["data", "gradient", "image", "output"]);
+        let network = GradNet::new(&Weights::parse(WITH_DIFFERENCES).unwrap()).unwrap();
+        assert_eq!((network.inputs(), network.outputs()), ([data.channels, gradient.channels], 3));
+        let made = network.apply(&Tensor::concat(&[&data, &gradient]));
+        let worst = worst(&moved(&planes(&image, 0), &made), &planes(&output, 0));
         assert!(worst < 1e-5, "{worst:.1e}");
     }
 }

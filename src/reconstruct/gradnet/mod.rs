@@ -1,0 +1,147 @@
+//! GradNet (Guo et al. 2019): a network in place of the screened Poisson solver. It was trained without clean images, against other
+//! samples of the same scenes.
+//!
+//! ```text
+//! colours, features, l1 ─ encoder ─┐
+//!                                  ├─ residual blocks ─ decoder ─ image, share of l1 ─ means of the colours ─ result
+//! differences ─────────── encoder ─┘
+//! ```
+//!
+//! Radiance goes in and comes out compressed. The compression biases the image; at the end its means over windows of 91 pixels
+//! become those of the sampled colours. The published network has neither the image of `l1` nor a share of it.
+
+mod means;
+
+use std::borrow::Cow;
+use std::path::Path;
+
+use self::means::with_means;
+use super::compressed::{DIFFERENCES, FEATURES, NOISELESS_DIFFERENCES, decompress, given};
+use super::inputs::{Inputs, check_memory};
+use super::residual::{noise, squared_error, windowed};
+use super::{Context, EdgeTrust, Method, Note, Parameter, Parameters, Reconstruction, Solution, Traits, parse};
+use crate::error::{Error, Result, SourceLoc};
+use crate::film::{Frame, Needs};
+use crate::image::planes::Planes;
+use crate::nn::{GradNet, Weights};
+
+/// `gradnet`.
+pub const METHOD: Method = Method {
+    id: "gradnet",
+    summary: "a network that solves for colours and differences with features, trained without clean images",
+    traits: Traits { exact: false, edges: EdgeTrust::ByVariance, ..Traits::FILTER },
+    parameters: &[
+        Parameter {
+            name: "means",
+            default: "on",
+            summary: "whether means over large windows become those of the sampled colours, `on` or `off`",
+        },
+        Parameter {
+            name: "weights",
+            default: "own",
+            summary: "`own`, or a safetensors file of tools/train/gradnet.py, for either of its presets",
+        },
+    ],
+    make,
+};
+
+/// Weights of the preset `own`.
+const WEIGHTS: &[u8] = include_bytes!("own.safetensors");
+
+/// Bytes held for every pixel besides the frame, and while the network works on a band: an upper bound.
+const BYTES: u64 = 600;
+
+/// Least estimated error, over the mean variance of the colours around: residuals tell no less.
+const LEAST_ERROR: f32 = 0.02;
+
+/// Channels that the encoders of data and gradients take and what comes out: as printed, and with noise, number of samples and `l1`.
+const PRINTED: ([usize; 2], usize) = ([3 + FEATURES, NOISELESS_DIFFERENCES], 3);
+const OWN: ([usize; 2], usize) = ([3 + FEATURES + 2 + 3, DIFFERENCES], 4);
+
+struct Solver {
+    network: GradNet,
+    /// The solver whose image the network is given, and mixes with its own.
+    l1: Option<Box<dyn Reconstruction>>,
+    means: bool,
+}
+
+fn make(parameters: &Parameters) -> Result<Box<dyn Reconstruction>> {
+    let file = parameters.get("weights", "`own` or a file", |text: &String| !text.is_empty())?;
+    let path = Path::new(&file);
+    let bytes = match file.as_str() {
+        "own" => Cow::Borrowed(WEIGHTS),
+        _ => Cow::Owned(std::fs::read(path).map_err(|error| Error::io(path, error))?),
+    };
+    let network = Weights::parse(&bytes).and_then(|weights| GradNet::new(&weights));
+    let network = network.map_err(|why| SourceLoc::file(path).invalid(why))?;
+    let l1 = match (network.inputs(), network.outputs()) {
+        PRINTED => None,
+        OWN => Some(parse("l1")?),
+        shape => {
+            let what = format!("has a network of {shape:?} channels instead of {PRINTED:?} or {OWN:?}");
+            return Err(SourceLoc::file(path).invalid(what));
+        }
+    };
+    Ok(Box::new(Solver { network, l1, means: parameters.switch("means")? }))
+}
+
+impl Reconstruction for Solver {
+    fn needs(&self) -> Needs {
+        Needs { features: true, ..Needs::EDGES }
+    }
+
+    fn estimates_error(&self) -> bool {
+        true
+    }
+
+    fn reconstruct(&self, frame: &Frame, context: &Context) -> Result<Solution> {
+        check_memory(frame, context, METHOD.id, BYTES)?;
+        let inputs = Inputs::new(frame, GradNet::MULTIPLE)?;
+        let [color, variance] = inputs.color()?;
+        let l1 = match &self.l1 {
+            Some(l1) => Some(inputs.mirrored(&l1.reconstruct(frame, context)?.image, inputs.scale)),
+            None => None,
+        };
+        (context.progress)("network", 0.2);
+        let more: Vec<_> = l1.iter().collect();
+        let output = self.network.apply(&given(&inputs, &[&color], &more, l1.is_some())?);
+        let image = Planes::from_fn(inputs.width, inputs.height, 3, |c, x, y| {
+            let pixel = output.pixel(x, y);
+            let own = decompress(pixel[c]);
+            let solved = l1.as_ref().map_or(own, |l1| l1.at(c, x as isize, y as isize));
+            let share = pixel.get(3).map_or(0.0, |score| 1.0 / (1.0 + libm::expf(-score)));
+            (own + share * (solved - own)).max(0.0)
+        });
+        (context.progress)("means", 0.8);
+        let mut notes = Vec::new();
+        if context.notes {
+            let image = image.to_image(frame.width, frame.height, 1.0 / inputs.scale);
+            notes.push(Note { name: "uncorrected".into(), image });
+        }
+        let image = if self.means { with_means(&image, &color) } else { image };
+        let noise = noise(&variance);
+        let error = squared_error(&color, &noise, &image);
+        let error = Some(inputs.error(&error.zip(&windowed(&noise), |error, noise| error.max(LEAST_ERROR * noise))));
+        let image = image.to_image(frame.width, frame.height, 1.0 / inputs.scale);
+        Ok(Solution { image, alpha: None, error, notes })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::nn::Tensor;
+
+    #[test]
+    fn outputs_of_the_shipped_weights_are_those_of_pytorch() {
+        let vectors = Weights::parse(include_bytes!("../../../tests/data/gradnet-own.safetensors")).unwrap();
+        let [data, gradient, output] = ["data", "gradient", "output"].map(|name| vectors.tensor(name).unwrap());
+        let network = Weights::parse(WEIGHTS).and_then(|weights| GradNet::new(&weights)).unwrap();
+        assert_eq!((network.inputs(), network.outputs()), OWN);
+        let made = network.apply(&Tensor::concat(&[&data, &gradient]));
+        let largest = output.data.iter().fold(0.0f32, |most, value| most.max(value.abs()));
+        for (made, expected) in made.data.iter().zip(&output.data) {
+            assert!((made - expected).abs() < 1e-5 * largest, "{made} instead of {expected}");
+        }
+    }
+}
