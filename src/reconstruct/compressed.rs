@@ -1,4 +1,4 @@
-//! What networks of encoders for colours and differences are given; tools/train/sampled.py makes the same of frames. Radiance, in
+//! Inputs of networks that have encoders for colours and differences; tools/train/encoders.py makes the same of frames. Radiance, in
 //! units of its typical luminance, is compressed by `T(x) = sign(x) log(1 + 16 |x|) / log 17`.
 
 use super::inputs::Inputs;

@@ -35,18 +35,19 @@ with_targets() {
 		--target l2 --half --layers features --method frgr --method frgr:denoiser=oidn --notes --resume
 }
 
-# Larger frames with differences, and no target to speak of but for the scenes that are kept apart.
+# Larger frames with differences, their targets with as many samples; smaller ones of the scenes that are kept apart.
 with_differences() {
-	differences="--spp 4,16,64 --half --layers features,gradients --method l1 --resume"
+	methods="--method l1 --method frgr --notes"
 	for scene in "$folder"/scenes/*; do
 		case $scene in
-		*9[0-9]) set -- apart --size 128x128 --reference 256 --target l2 --method l2 --method control_variate --method least_trimmed --method frgr ;;
-		*) set -- whole --size 256x256 --reference 2 ;;
+		*9[0-9]) set -- apart --size 128x128 --reference 256 --method l2 --method control_variate --method least_trimmed ;;
+		*) set -- whole --size 256x256 --reference 64 ;;
 		esac
 		to=$folder/frames-$1
 		shift
 		# shellcheck disable=SC2086 # several options
-		"$fluxion" dataset "$scene/scene.xml" -o "$to" $differences "$@" -q
+		"$fluxion" dataset "$scene/scene.xml" -o "$to" --spp 4,16,64 --half --layers features,gradients --target l2 $methods "$@" \
+			--resume -q
 	done
 }
 
@@ -54,7 +55,7 @@ case $method in
 gradnet)
 	with_differences
 	weights gradnet gradnet-own "$folder/frames-whole" "$folder/frames-apart" --preset own
-	weights gradnet gradnet-paper "$folder/frames-whole" "$folder/frames-apart" --preset paper
+	weights gradnet gradnet-paper "$folder/frames-whole" "$folder/frames-apart" --preset paper --width 16
 	;;
 net | blend)
 	with_targets 02468 even 4,16,64
@@ -62,6 +63,9 @@ net | blend)
 	weights net net "$folder/frames-even" "$folder/frames-odd"
 	if [ "$method" = blend ]; then
 		weights blend blend-oidn oidn "$folder/frames-even" "$folder/frames-odd"
+	else
+		with_differences
+		weights differences differences "$folder/frames-whole" "$folder/frames-apart"
 	fi
 	;;
 *)

@@ -98,10 +98,10 @@ impl Reconstruction for Solver {
         check_memory(frame, context, METHOD.id, BYTES)?;
         let inputs = Inputs::new(frame, GradNet::MULTIPLE)?;
         let [color, variance] = inputs.color()?;
-        let l1 = match &self.l1 {
-            Some(l1) => Some(inputs.mirrored(&l1.reconstruct(frame, context)?.image, inputs.scale)),
-            None => None,
-        };
+        let report = |what: &str, done: f32| (context.progress)(what, 0.2 * done);
+        let solve = |l1: &dyn Reconstruction| l1.reconstruct(frame, &Context { progress: &report, ..*context });
+        let solved = self.l1.as_deref().map(solve).transpose()?;
+        let l1 = solved.map(|solved| inputs.mirrored(&solved.image, inputs.scale));
         (context.progress)("network", 0.2);
         let more: Vec<_> = l1.iter().collect();
         let output = self.network.apply(&given(&inputs, &[&color], &more, l1.is_some())?);
