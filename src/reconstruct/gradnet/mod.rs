@@ -8,7 +8,8 @@
 //! ```
 //!
 //! Radiance goes in and comes out compressed. The compression biases the image; at the end its means over windows of 91 pixels
-//! become those of the sampled colours. The published network has neither the image of `l1` nor a share of it.
+//! become those of the sampled colours. Where that differs from them by more than noise, and with more samples than the network was
+//! trained for, the result goes back to `l1`. The published network has neither the image of `l1` nor a share of it.
 
 mod means;
 
@@ -18,7 +19,7 @@ use std::path::Path;
 use self::means::with_means;
 use super::compressed::{DIFFERENCES, FEATURES, NOISELESS_DIFFERENCES, decompress, given};
 use super::inputs::{Inputs, check_memory};
-use super::residual::{noise, squared_error, windowed};
+use super::residual::{noise, squared_error, trust, windowed};
 use super::{Context, EdgeTrust, Method, Note, Parameter, Parameters, Reconstruction, Solution, Traits, parse};
 use crate::error::{Error, Result, SourceLoc};
 use crate::film::{Frame, Needs};
@@ -50,6 +51,9 @@ const WEIGHTS: &[u8] = include_bytes!("own.safetensors");
 
 /// Bytes held for every pixel besides the frame, and while the network works on a band: an upper bound.
 const BYTES: u64 = 600;
+
+/// Largest number of samples that the network was trained for.
+const TRAINED: f32 = 64.0;
 
 /// Least estimated error, over the mean variance of the colours around: residuals tell no less.
 const LEAST_ERROR: f32 = 0.02;
@@ -120,6 +124,18 @@ impl Reconstruction for Solver {
         }
         let image = if self.means { with_means(&image, &color) } else { image };
         let noise = noise(&variance);
+        let image = match &l1 {
+            Some(l1) => {
+                let trust = trust(&windowed(&noise), &squared_error(&color, &noise, &image), inputs.spp);
+                let share = (TRAINED / inputs.spp).min(1.0);
+                Planes::from_fn(inputs.width, inputs.height, 3, |c, x, y| {
+                    let (x, y) = (x as isize, y as isize);
+                    let safe = l1.at(c, x, y);
+                    safe + share * trust.at(0, x, y) * (image.at(c, x, y) - safe)
+                })
+            }
+            None => image,
+        };
         let error = squared_error(&color, &noise, &image);
         let error = Some(inputs.error(&error.zip(&windowed(&noise), |error, noise| error.max(LEAST_ERROR * noise))));
         let image = image.to_image(frame.width, frame.height, 1.0 / inputs.scale);
