@@ -1,7 +1,7 @@
 """Random crops of frames with differences, transposed and mirrored, their colours permuted, at random.
 
-A frame is one tensor, channels first, of parts that a layout names in their order with their numbers of channels. A part `dx` or
-`dy`, or with another ending than those, belongs to differences in that direction; `features` begin with the albedo.
+A frame is one tensor, channels first, of parts that a layout names in their order with their numbers of channels. Parts whose names
+begin with dx or dy belong to differences in that direction; `features` begin with the albedo.
 """
 import torch
 

@@ -8,7 +8,6 @@ FRAMES are folders of `fluxion dataset --method frgr --notes`; ten of every hund
 pixel weights of the images and a correction in units of frgr's luminance. `export` writes src/reconstruct/net/net.safetensors if the
 gate holds: on the scenes kept apart less error than frgr at every sample count.
 """
-import argparse
 import json
 import os
 
@@ -232,8 +231,4 @@ def export(options):
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("action", choices=["train", "test", "export"])
-    runs.arguments(parser, STEPS)
-    options = parser.parse_args()
-    {"train": train, "test": test, "export": export}[options.action](options)
+    runs.command(__doc__, STEPS, train=train, test=test, export=export)

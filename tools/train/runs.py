@@ -1,4 +1,5 @@
 """Training runs: steps that can be interrupted and resumed, with a log; a step is the same whenever it is taken."""
+import argparse
 import csv
 import math
 import os
@@ -22,6 +23,15 @@ def arguments(parser, steps):
     parser.add_argument("--steps", type=int, default=steps)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--threads", type=int, default=2)
+
+
+def command(description, steps, **actions):
+    """Runs the action that the command line names, with the options of a run."""
+    parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("action", choices=list(actions))
+    arguments(parser, steps)
+    options = parser.parse_args()
+    actions[options.action](options)
 
 
 def state_path(folder):
