@@ -117,6 +117,14 @@ impl Convolution {
         self.outputs
     }
 
+    /// Number of channels that come out where `given` go in. An error if the layer takes another number.
+    pub fn after(&self, given: usize) -> Result<usize, String> {
+        match self.inputs {
+            taken if taken == given => Ok(self.outputs),
+            taken => Err(format!("a layer takes {taken} channels instead of {given}")),
+        }
+    }
+
     /// The convolution of a tensor.
     pub fn apply(&self, input: &Tensor) -> Tensor {
         let (width, height) = self.size(input);

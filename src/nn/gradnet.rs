@@ -61,27 +61,24 @@ impl GradNet {
 
     /// Fails if layers do not fit each other.
     fn check(&self) -> Result<(), String> {
-        let take = |channels: &mut usize, layer: &Convolution, beside: usize| {
-            let (given, taken) = (*channels + beside, layer.inputs());
-            *channels = layer.outputs();
-            if given == taken { Ok(()) } else { Err(format!("a layer takes {taken} channels instead of {given}")) }
-        };
         let [mut data, mut gradient] = self.inputs();
-        let mut near = data + gradient;
+        let both = data + gradient;
         let mut skips = Vec::new();
         for (a, b) in self.data.iter().zip(&self.gradient) {
-            take(&mut data, a, 0)?;
-            take(&mut gradient, b, 0)?;
+            (data, gradient) = (a.after(data)?, b.after(gradient)?);
             skips.push(data + gradient);
         }
         let mut channels = data + gradient;
-        self.blocks.iter().flatten().try_for_each(|layer| take(&mut channels, layer, 0))?;
-        self.decoder.iter().zip(skips.iter().rev()).try_for_each(|(layer, skip)| take(&mut channels, layer, *skip))?;
-        if let Some([first, last]) = &self.near {
-            take(&mut near, first, 0)?;
-            take(&mut channels, last, near)?;
+        for layer in self.blocks.iter().flatten() {
+            channels = layer.after(channels)?;
         }
-        take(&mut channels, &self.out, 0)
+        for (layer, skip) in self.decoder.iter().zip(skips.iter().rev()) {
+            channels = layer.after(channels + skip)?;
+        }
+        if let Some([first, last]) = &self.near {
+            channels = last.after(channels + first.after(both)?)?;
+        }
+        self.out.after(channels).map(|_| ())
     }
 
     /// Number of channels that each encoder takes.

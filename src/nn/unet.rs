@@ -44,9 +44,8 @@ impl UNet {
     fn check(&self) -> Result<(), String> {
         let mut channels = self.first.inputs();
         let mut take = |layer: &Convolution, beside: usize| {
-            let (given, taken) = (channels + beside, layer.inputs());
-            channels = layer.outputs();
-            if given == taken { Ok(()) } else { Err(format!("a layer takes {taken} channels instead of {given}")) }
+            channels = layer.after(channels + beside)?;
+            Ok::<_, String>(())
         };
         take(&self.first, 0)?;
         self.down.iter().try_for_each(|layer| take(layer, 0))?;

@@ -26,18 +26,17 @@ pub const DIFFERENCES: usize = 8;
 pub const NOISELESS_DIFFERENCES: usize = 6;
 
 /// Compressed images, features, noise and number of samples, and more compressed images for the encoder of data; differences and
-/// their noise for the other one. Not `with_noise`: images, features and differences only.
-pub fn given(inputs: &Inputs, images: &[&Planes], more: &[&Planes], with_noise: bool) -> Result<Tensor> {
+/// their noise for the other one. Without the `variance` of the colours neither noise nor number of samples.
+pub fn given(inputs: &Inputs, images: &[&Planes], more: &[&Planes], variance: Option<&Planes>) -> Result<Tensor> {
     let [albedo, normal, depth] = [Layer::Albedo, Layer::Normal, Layer::Depth].map(|layer| inputs.planes(layer, 1.0));
     let (albedo, normal, depth) = (albedo?, normal?, depth?);
     let far = far(&inputs.frame.require(Layer::Depth)?.data);
-    let [_, variance] = inputs.color()?;
     let [[dx, of_dx], [dy, of_dy]] = [inputs.gradient(0)?, inputs.gradient(1)?];
     let deviation = |variance: &Planes| mean(&variance.map(|variance| variance.sqrt().min(MOST_NOISE)));
-    let [noise, of_dx, of_dy] = [&variance, &of_dx, &of_dy].map(deviation);
+    let noise = variance.map(|variance| [variance, &of_dx, &of_dy].map(deviation));
     let samples = libm::log2f(inputs.spp) / 4.0;
     let of_images = |images: &[&Planes]| images.iter().map(|image| image.channels()).sum::<usize>();
-    let of_noise = if with_noise { 4 } else { 0 };
+    let of_noise = if noise.is_some() { 4 } else { 0 };
     let channels = of_images(images) + of_images(more) + FEATURES + NOISELESS_DIFFERENCES + of_noise;
     Ok(Tensor::from_fn(inputs.width, inputs.height, channels, |x, y, pixel| {
         let (x, y) = (x as isize, y as isize);
@@ -50,14 +49,14 @@ pub fn given(inputs: &Inputs, images: &[&Planes], more: &[&Planes], with_noise: 
         (0..3).for_each(|c| put(albedo.at(c, x, y)));
         (0..3).for_each(|c| put(0.5 * (normal.at(c, x, y) + 1.0)));
         put((depth.at(0, x, y).max(0.0) / far).min(1.0));
-        if with_noise {
-            put_all(&noise, &mut put);
+        if let Some([of_color, ..]) = &noise {
+            put_all(of_color, &mut put);
             put(samples);
         }
         more.iter().for_each(|image| put_all(image, &mut put));
         [&dx, &dy].into_iter().for_each(|image| put_all(image, &mut put));
-        if with_noise {
-            [&of_dx, &of_dy].into_iter().for_each(|image| put_all(image, &mut put));
+        if let Some([_, of_differences @ ..]) = &noise {
+            of_differences.iter().for_each(|image| put_all(image, &mut put));
         }
     }))
 }

@@ -13,6 +13,9 @@ const MOST: f32 = 1e15;
 const TRUST: f32 = 0.5;
 const FEW: f32 = 16.0;
 
+/// Least estimated error, over the mean variance of the colours around.
+const LEAST_ERROR: f32 = 0.02;
+
 /// Mean over the channels.
 pub fn mean(planes: &Planes) -> Planes {
     planes.sum().map(|sum| sum / 3.0)
@@ -34,6 +37,19 @@ pub fn squared_error(color: &Planes, noise: &Planes, image: &Planes) -> Planes {
 /// Means over the window of [`squared_error`].
 pub fn windowed(planes: &Planes) -> Planes {
     planes.box_mean(RADIUS)
+}
+
+/// An image's [`squared_error`], but no less than a small share of the noise around: residuals tell no less.
+pub fn estimated_error(error: &Planes, noise: &Planes) -> Planes {
+    error.zip(noise, |error, noise| error.max(LEAST_ERROR * noise))
+}
+
+/// An image, pulled back to a safe one where it is not trusted.
+pub fn pulled_back(image: &Planes, safe: &Planes, trust: &Planes) -> Planes {
+    Planes::from_fn(image.width, image.height, image.channels(), |c, x, y| {
+        let (x, y) = (x as isize, y as isize);
+        safe.at(c, x, y) + trust.at(0, x, y) * (image.at(c, x, y) - safe.at(c, x, y))
+    })
 }
 
 /// How far an image can be trusted, from 0 to 1, by its [`squared_error`] beyond the noise around, both means over windows. With more

@@ -6,13 +6,10 @@ use crate::film::Layer;
 use crate::image::planes::Planes;
 use crate::nn::Tensor;
 use crate::reconstruct::inputs::Inputs;
-use crate::reconstruct::residual::{mean, noise, squared_error, trust, windowed};
+use crate::reconstruct::residual::{estimated_error, mean, noise, squared_error, trust, windowed};
 
 /// Radius of the window that residuals are averaged over, by themselves.
 const RESIDUAL: usize = 3;
-
-/// Least share of the noise that a candidate is believed to have as error.
-const LEAST_ERROR: f32 = 0.02;
 
 /// Luminance below which differences count as absolute, in units of the typical luminance.
 const DARK: f32 = 0.1;
@@ -47,8 +44,7 @@ impl Evidence {
         let bias = of_each(&|k| squared_error(&color, &variance, &images[k]));
         let noise = windowed(&variance).map(|noise| noise.max(1e-9));
         let residual_noise = variance.box_mean(RESIDUAL);
-        // What residuals tell of it, at least a small share of the noise.
-        let claimed = bias.part(best, 1).zip(&noise, |bias, noise| bias.max(LEAST_ERROR * noise));
+        let claimed = estimated_error(&bias.part(best, 1), &noise);
         let albedo = mean(&inputs.planes(Layer::Albedo, 1.0)?);
         Ok(Self { luminance, residual, bias, variance, residual_noise, noise, claimed, albedo })
     }

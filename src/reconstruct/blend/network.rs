@@ -27,10 +27,7 @@ impl Network {
         let layers = DILATIONS.iter().enumerate().map(layer).collect::<Result<Vec<_>, _>>()?;
         let mut channels = 4 * candidates + 5;
         for layer in &layers {
-            if layer.inputs() != channels {
-                return Err(format!("a layer takes {} channels instead of {channels}", layer.inputs()));
-            }
-            channels = layer.outputs();
+            channels = layer.after(channels)?;
         }
         if channels != candidates {
             return Err(format!("the weights are for {channels} images instead of {candidates}"));

@@ -19,7 +19,7 @@ use std::path::Path;
 use self::means::with_means;
 use super::compressed::{DIFFERENCES, FEATURES, NOISELESS_DIFFERENCES, decompress, given};
 use super::inputs::{Inputs, check_memory};
-use super::residual::{noise, squared_error, trust, windowed};
+use super::residual::{estimated_error, noise, pulled_back, squared_error, trust, windowed};
 use super::{Context, EdgeTrust, Method, Note, Parameter, Parameters, Reconstruction, Solution, Traits, parse};
 use crate::error::{Error, Result, SourceLoc};
 use crate::film::{Frame, Needs};
@@ -54,9 +54,6 @@ const BYTES: u64 = 600;
 
 /// Largest number of samples that the network was trained for.
 const TRAINED: f32 = 64.0;
-
-/// Least estimated error, over the mean variance of the colours around: residuals tell no less.
-const LEAST_ERROR: f32 = 0.02;
 
 /// Channels that the encoders of data and gradients take and what comes out: as printed, and with noise, number of samples and `l1`.
 const PRINTED: ([usize; 2], usize) = ([3 + FEATURES, NOISELESS_DIFFERENCES], 3);
@@ -108,7 +105,7 @@ impl Reconstruction for Solver {
         let l1 = solved.map(|solved| inputs.mirrored(&solved.image, inputs.scale));
         (context.progress)("network", 0.2);
         let more: Vec<_> = l1.iter().collect();
-        let output = self.network.apply(&given(&inputs, &[&color], &more, l1.is_some())?);
+        let output = self.network.apply(&given(&inputs, &[&color], &more, l1.as_ref().map(|_| &variance))?);
         let image = Planes::from_fn(inputs.width, inputs.height, 3, |c, x, y| {
             let pixel = output.pixel(x, y);
             let own = decompress(pixel[c]);
@@ -124,20 +121,16 @@ impl Reconstruction for Solver {
         }
         let image = if self.means { with_means(&image, &color) } else { image };
         let noise = noise(&variance);
+        let around = windowed(&noise);
         let image = match &l1 {
             Some(l1) => {
-                let trust = trust(&windowed(&noise), &squared_error(&color, &noise, &image), inputs.spp);
                 let share = (TRAINED / inputs.spp).min(1.0);
-                Planes::from_fn(inputs.width, inputs.height, 3, |c, x, y| {
-                    let (x, y) = (x as isize, y as isize);
-                    let safe = l1.at(c, x, y);
-                    safe + share * trust.at(0, x, y) * (image.at(c, x, y) - safe)
-                })
+                let trust = trust(&around, &squared_error(&color, &noise, &image), inputs.spp);
+                pulled_back(&image, l1, &trust.map(|trust| share * trust))
             }
             None => image,
         };
-        let error = squared_error(&color, &noise, &image);
-        let error = Some(inputs.error(&error.zip(&windowed(&noise), |error, noise| error.max(LEAST_ERROR * noise))));
+        let error = Some(inputs.error(&estimated_error(&squared_error(&color, &noise, &image), &around)));
         let image = image.to_image(frame.width, frame.height, 1.0 / inputs.scale);
         Ok(Solution { image, alpha: None, error, notes })
     }

@@ -16,7 +16,7 @@ mod features;
 use self::features::{DARK, features};
 use super::compressed::{compress, decompress, given};
 use super::inputs::{Inputs, check_memory};
-use super::residual::{mean, noise, squared_error, trust, windowed};
+use super::residual::{mean, noise, pulled_back, squared_error, trust, windowed};
 use super::{Context, EdgeTrust, Method, Note, Parameter, Parameters, Reconstruction, Solution, Traits, parse};
 use crate::error::{Error, Result};
 use crate::film::{Frame, Needs};
@@ -156,18 +156,14 @@ impl Reconstruction for Net {
         (context.progress)("differences", 0.8);
         let claimed = mean(&claimed).map(|error| error.max(0.0).sqrt());
         let shown: Vec<_> = images.iter().collect();
-        let output = self.with_differences.apply(&given(&inputs, &shown, &[&claimed], true)?);
+        let output = self.with_differences.apply(&given(&inputs, &shown, &[&claimed], Some(&variance))?);
         let both = by_images.zip(&moved(&images[0], &output), |one, other| 0.5 * (one + other));
         let corrected = bounded(&images[0], &both, (FEW / inputs.spp).min(1.0).powi(2));
         (context.progress)("safety", 0.95);
         let noise = noise(&variance);
         let image = if self.safety {
             let trust = trust(&windowed(&noise), &squared_error(&color, &noise, &corrected), inputs.spp);
-            Planes::from_fn(inputs.width, inputs.height, 3, |c, x, y| {
-                let (x, y) = (x as isize, y as isize);
-                let safe = images[0].at(c, x, y);
-                safe + trust.at(0, x, y) * (corrected.at(c, x, y) - safe)
-            })
+            pulled_back(&corrected, &images[0], &trust)
         } else {
             corrected
         };
