@@ -36,6 +36,7 @@ pub mod image;
 pub mod scene;
 
 pub mod film;
+pub mod neighbours;
 pub mod plan;
 pub mod render;
 

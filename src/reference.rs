@@ -7,7 +7,7 @@ use crate::film::{Film, Layer, Needs, Provenance};
 use crate::image::Image;
 use crate::image::io::{ImageFile, Kind, Pixels, read, write};
 use crate::math::rng;
-use crate::render::{Budget, Control, RenderSettings, Shift, render};
+use crate::render::{Budget, Control, RenderSettings, render};
 use crate::scene::Scene;
 
 /// Seed of references, far from those that people choose.
@@ -75,8 +75,7 @@ impl Reference {
             let progress = |share: f32| (control.progress)(0.5 * (k as f32 + share));
             let control = Control { stop: control.stop, progress: &progress, sink: None };
             let (budget, first, needs) = (Budget::Spp(spp), self.spp / 2, Needs::default());
-            let outcome =
-                render(scene, RenderSettings { budget, seed, first, needs, shift: Shift::default() }, &control);
+            let outcome = render(scene, RenderSettings { seed, first, ..RenderSettings::new(budget, needs) }, &control);
             if outcome.stopped {
                 return Ok(false);
             }

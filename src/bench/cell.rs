@@ -16,7 +16,7 @@ use crate::metrics::METRICS;
 use crate::plan::Plan;
 use crate::reconstruct::{self, Context, Reconstruction};
 use crate::reference::fingerprint;
-use crate::render::{self, Control, RenderSettings, Shift, render};
+use crate::render::{self, Control, RenderSettings, render};
 
 /// Limit of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -99,7 +99,7 @@ impl<'a> Runner<'a> {
     }
 
     fn settings(&self, budget: render::Budget, seed: u64) -> RenderSettings {
-        RenderSettings { budget, seed, first: 0, needs: self.needs, shift: Shift::default() }
+        RenderSettings { seed, ..RenderSettings::new(budget, self.needs) }
     }
 
     fn frame(

@@ -5,7 +5,8 @@
 //! | 8 | `FLUXCKPT` |
 //! | 4 | version of the format |
 //! | 4 | length of the header |
-//! | | header, JSON: origin of the film, seconds, first rejected sample, notes of an adaptive run |
+//! | | header, JSON: origin of the film, seconds, first rejected sample, kernel, notes of an adaptive run |
+//! | | of a film with chosen neighbours: their mask of every pixel |
 //! | | the film's statistics, tile by tile |
 //! | | of an adaptive run: every pixel's sample count goal, and the images of the pass before |
 //! | 4 | CRC-32 of everything before |
@@ -22,16 +23,18 @@ use super::{Checkpoint, Origin};
 use crate::adaptive::{Journal, Notes, PreviousPass};
 use crate::error::{Error, Result};
 use crate::files;
-use crate::film::{Film, Rejected};
+use crate::film::{EdgeNeed, Film, Kernel, Needs, Neighbours, Rejected};
 use crate::image::Image;
 use crate::render::{RenderOutcome, SampleId};
 
 const MAGIC: [u8; 8] = *b"FLUXCKPT";
 
 /// Version of the format: raised whenever the bytes change their meaning.
-const VERSION: u32 = 3;
-/// The version before, whose films have no alpha: they have this many statistics.
-const BEFORE: (u32, usize) = (2, 10);
+const VERSION: u32 = 4;
+/// Versions before that are read, too.
+const BEFORE: [u32; 2] = [3, 2];
+/// The version whose films have no alpha, and the number of statistics that they have.
+const WITHOUT_ALPHA: (u32, usize) = (2, 10);
 
 /// Headers longer than this are damaged.
 const MAX_HEADER: u32 = 1 << 20;
@@ -43,6 +46,21 @@ struct Header {
     /// The first sample that was not finite.
     rejected: Option<(SampleId, String)>,
     adaptive: Option<Adaptive>,
+    #[serde(default)]
+    kernel: StoredKernel,
+}
+
+/// The half-edges that the film has.
+#[derive(Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum StoredKernel {
+    #[default]
+    Cross,
+    Pending,
+    /// By masks that follow.
+    Chosen {
+        directed: bool,
+    },
 }
 
 /// The parts of a journal that follow.
@@ -110,12 +128,18 @@ fn write(to: &mut impl Write, origin: &Origin, outcome: &RenderOutcome, journal:
     if let [run] = origin.runs.as_mut_slice() {
         run.samples = outcome.film.most_samples();
     }
-    let header = Header { origin, seconds: outcome.elapsed.as_secs_f64(), rejected, adaptive };
+    let (kernel, masks) = match outcome.film.kernel() {
+        Kernel::Cross => (StoredKernel::Cross, &[][..]),
+        Kernel::Pending => (StoredKernel::Pending, &[][..]),
+        Kernel::Chosen(chosen) => (StoredKernel::Chosen { directed: chosen.is_directed() }, chosen.masks()),
+    };
+    let header = Header { origin, seconds: outcome.elapsed.as_secs_f64(), rejected, adaptive, kernel };
     let header = serde_json::to_vec(&header)?;
     to.write_all(&MAGIC)?;
     to.write_all(&VERSION.to_le_bytes())?;
     to.write_all(&(header.len() as u32).to_le_bytes())?;
     to.write_all(&header)?;
+    masks.iter().try_for_each(|mask| to.write_all(&mask.to_le_bytes()))?;
     outcome.film.write(to)?;
     let Some(journal) = journal else { return Ok(()) };
     journal.goals.iter().try_for_each(|goal| to.write_all(&goal.to_le_bytes()))?;
@@ -162,9 +186,11 @@ fn read(from: &mut impl Read, length: u64) -> io::Result<Checkpoint> {
         return Err(io::Error::other("is no checkpoint of `fluxion render --checkpoint`"));
     }
     let version = word(from)?;
-    if ![BEFORE.0, VERSION].contains(&version) {
-        let what =
-            format!("is a checkpoint of format {version}; this fluxion reads formats {} and {VERSION}", BEFORE.0);
+    if version != VERSION && !BEFORE.contains(&version) {
+        let what = format!(
+            "is a checkpoint of format {version}; this fluxion reads formats {} to {VERSION}",
+            BEFORE.iter().min().unwrap_or(&VERSION)
+        );
         return Err(io::Error::other(what));
     }
     let count = word(from)?;
@@ -177,13 +203,21 @@ fn read(from: &mut impl Read, length: u64) -> io::Result<Checkpoint> {
     let (width, height) = header.origin.size;
     let pixels = width.checked_mul(height).filter(|&pixels| pixels > 0);
     // Nothing is allocated for more pixels than the file has bytes for.
-    let least = pixels.and_then(|pixels| pixels.checked_mul(header.origin.needs.bytes_per_pixel()));
+    let least = pixels.and_then(|pixels| pixels.checked_mul(header.least_bytes()));
     if least.is_none_or(|least| least as u64 > length) {
         return Err(invalid(format!("its header claims {width}x{height} pixels in {length} bytes")));
     }
+    let mut film = Film::new(width, height, header.origin.needs);
+    match header.kernel {
+        StoredKernel::Cross => {}
+        StoredKernel::Pending => film = film.pending(),
+        StoredKernel::Chosen { directed } => {
+            film.choose(Neighbours::new((width, height), words(from, width * height)?, directed));
+        }
+    }
     let film = match version {
-        VERSION => Film::read((width, height), header.origin.needs, from)?,
-        _ => Film::read_statistics((width, height), header.origin.needs, BEFORE.1, from)?,
+        version if version == WITHOUT_ALPHA.0 => film.read_statistics(WITHOUT_ALPHA.1, from)?,
+        _ => film.read(from)?,
     };
     let journal = match header.adaptive {
         Some(adaptive) => Some(journal(adaptive, (width, height), from)?),
@@ -197,26 +231,36 @@ fn read(from: &mut impl Read, length: u64) -> io::Result<Checkpoint> {
 }
 
 fn journal(adaptive: Adaptive, (width, height): (usize, usize), from: &mut impl Read) -> io::Result<Journal> {
-    let mut words = |count: usize| {
-        let mut bytes = Vec::new();
-        from.by_ref().take(4 * count as u64).read_to_end(&mut bytes)?;
-        if bytes.len() < 4 * count {
-            return Err(io::Error::from(io::ErrorKind::UnexpectedEof));
-        }
-        let words = bytes.chunks_exact(4).map(|word| u32::from_le_bytes([word[0], word[1], word[2], word[3]]));
-        Ok(words.collect::<Vec<_>>())
-    };
-    let goals = if adaptive.goals { words(width * height)? } else { Vec::new() };
+    let goals = if adaptive.goals { words(from, width * height)? } else { Vec::new() };
     let mut previous = None;
     if adaptive.previous {
         let mut images = Vec::new();
         for channels in PreviousPass::channels() {
-            let data = words(width * height * channels)?.into_iter().map(f32::from_bits).collect();
+            let data = words(from, width * height * channels)?.into_iter().map(f32::from_bits).collect();
             images.push(Image { width, height, channels, data });
         }
         previous = PreviousPass::from_images(images);
     }
     Ok(Journal { notes: adaptive.notes, goals, previous })
+}
+
+impl Header {
+    /// Fewest bytes that a pixel of the film takes.
+    fn least_bytes(&self) -> usize {
+        match self.kernel {
+            StoredKernel::Cross => self.origin.needs.bytes_per_pixel(),
+            _ => Needs { edges: EdgeNeed::Off, ..self.origin.needs }.bytes_per_pixel(),
+        }
+    }
+}
+
+fn words(from: &mut impl Read, count: usize) -> io::Result<Vec<u32>> {
+    let mut bytes = Vec::new();
+    from.by_ref().take(4 * count as u64).read_to_end(&mut bytes)?;
+    if bytes.len() < 4 * count {
+        return Err(io::Error::from(io::ErrorKind::UnexpectedEof));
+    }
+    Ok(bytes.chunks_exact(4).map(|word| u32::from_le_bytes([word[0], word[1], word[2], word[3]])).collect())
 }
 
 fn word(from: &mut impl Read) -> io::Result<u32> {

@@ -38,6 +38,13 @@ impl Checkpoint {
     /// that the order of arguments changes no bit.
     pub fn merge(&mut self, other: Self) -> Result<(), String> {
         self.origin.adds_to(&other.origin)?;
+        if self.outcome.film.kernel() != other.outcome.film.kernel() {
+            return Err(
+                "has chosen other neighbours by its own pilot: films that are to be merged take a --kernel without \
+                        a pilot"
+                    .into(),
+            );
+        }
         self.outcome.film.merge(&other.outcome.film);
         self.outcome.elapsed += other.outcome.elapsed;
         self.outcome.first_rejected = self.outcome.first_rejected.or(other.outcome.first_rejected);

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use crate::error::{Error, Result};
 use crate::film::{Needs, Provenance};
 use crate::math::rng;
+use crate::neighbours::Selector;
 use crate::render::RenderOutcome;
 use crate::render::Shift;
 use crate::scene::Scene;
@@ -34,6 +35,9 @@ pub struct Origin {
     pub needs: Needs,
     /// How differences are sampled.
     pub shift: Shift,
+    /// Neighbours that paths are shifted to.
+    #[serde(default)]
+    pub kernel: Selector,
     /// Numbers of the samples; a merged film has those of several runs.
     pub runs: Vec<Run>,
 }
@@ -126,6 +130,9 @@ impl Origin {
         if self.needs.edges.is_sampled() && other.needs.edges.is_sampled() && self.shift != other.shift {
             return Err("samples differences by another --shift".into());
         }
+        if self.needs.edges.is_sampled() && other.needs.edges.is_sampled() && self.kernel != other.kernel {
+            return Err(format!("samples differences to other neighbours: --kernel {}", self.kernel));
+        }
         Ok(())
     }
 
@@ -141,6 +148,7 @@ impl Origin {
             seconds: format!("{:.3}", outcome.elapsed.as_secs_f64()),
             method: self.method.clone(),
             plan: self.plan.clone(),
+            kernel: Some(self.kernel).filter(|kernel| !kernel.is_cross()).map_or_else(String::new, |k| k.to_string()),
         }
     }
 }

@@ -9,6 +9,7 @@ use fluxion::adaptive::ALLOCATORS;
 use fluxion::error::Error;
 use fluxion::film::{Layer, Needs};
 use fluxion::metrics::METRICS;
+use fluxion::neighbours::KERNELS;
 use fluxion::plan::Plan;
 use fluxion::reconstruct::{self, METHODS, Method};
 use fluxion::reference::fingerprint;
@@ -33,6 +34,9 @@ pub struct Args {
     /// List what scene files may contain, as a Markdown table
     #[arg(long)]
     plugins: bool,
+    /// List the kernels: neighbours that paths can be shifted to
+    #[arg(long)]
+    kernels: bool,
     /// List the metrics
     #[arg(long)]
     metrics: bool,
@@ -54,13 +58,18 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     if args.metrics {
         METRICS.iter().try_for_each(|metric| out!("{:>10}  {}", metric.id, metric.summary))?;
     }
+    if args.kernels {
+        KERNELS.iter().try_for_each(|kernel| out!("{:>10}  {}; {}", kernel.id, kernel.summary, kernel.takes()))?;
+    }
     match &args.scene {
         Some(path) => {
             let options = load::Options { sensor_optional: true, ..args.options.options() };
             describe(&super::scene::load(path, &options)?, &args.method)?;
         }
-        None if !(args.methods || args.layers || args.plugins || args.metrics) => {
-            bail!(Error::Usage("give a scene file, or one of --methods, --layers, --plugins, --metrics".into()));
+        None if !(args.methods || args.kernels || args.layers || args.plugins || args.metrics) => {
+            bail!(Error::Usage(
+                "give a scene file, or one of --methods, --kernels, --layers, --plugins, --metrics".into()
+            ));
         }
         None => {}
     }

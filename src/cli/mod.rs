@@ -6,6 +6,7 @@ mod compare;
 mod dataset;
 mod info;
 mod interrupt;
+mod kernel;
 mod merge;
 mod method;
 mod outputs;

@@ -23,6 +23,9 @@ pub struct Args {
     /// Part of the film to render, as its first column and row and its size: 100,50,320x180
     #[arg(long, value_parser = parse_crop, value_name = "X,Y,WxH")]
     pub crop: Option<Crop>,
+    /// Longest paths in edges in place of the scene's: 1 is visible emitters only, 2 adds direct light, -1 is no limit
+    #[arg(long, allow_negative_numbers = true, value_name = "N", value_parser = parse_depth)]
+    pub max_depth: Option<u32>,
     /// Take every warning of the scene file's reader for an error
     #[arg(long)]
     strict: bool,
@@ -36,6 +39,7 @@ impl Args {
             sensor: self.sensor.clone(),
             size: self.size,
             crop: self.crop,
+            max_depth: self.max_depth,
             strict: self.strict,
             ..load::Options::default()
         }
@@ -47,7 +51,10 @@ impl Args {
         let sensor = self.sensor.iter().map(|sensor| format!(" --sensor {sensor}"));
         let size = self.size.iter().map(|(width, height)| format!(" --size {width}x{height}"));
         let crop = self.crop.iter().map(|crop| format!(" --crop {crop}"));
-        definitions.chain(sensor).chain(size).chain(crop).collect()
+        let depth = self.max_depth.map(|depth| {
+            if depth == u32::MAX { " --max-depth -1".to_owned() } else { format!(" --max-depth {depth}") }
+        });
+        definitions.chain(sensor).chain(size).chain(crop).chain(depth).collect()
     }
 }
 
@@ -56,6 +63,11 @@ pub fn load(path: &Path, options: &load::Options) -> Result<Scene> {
     let scene = load::load(path, options)?;
     scene.warnings().iter().for_each(|warning| note!("warning: {warning}"));
     Ok(scene)
+}
+
+fn parse_depth(text: &str) -> Result<u32, String> {
+    let depth = if text == "-1" { Some(u32::MAX) } else { text.parse().ok() };
+    depth.ok_or_else(|| "a depth is a number of edges, or -1 for any".to_owned())
 }
 
 fn parse_crop(text: &str) -> Result<Crop, String> {

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::source::{Axis, Source};
 use super::statistic::{Record, Statistic};
-use super::{Film, Frame, Layer, Tile};
+use super::{BINS, Edges, Film, Frame, Kernel, Layer, Tile};
 use crate::image::Image;
 
 impl Film {
@@ -16,6 +16,11 @@ impl Film {
                 frame.set(layer, image);
             }
         }
+        match &self.kernel {
+            Kernel::Cross => {}
+            Kernel::Pending => frame.set_edges(Edges::new((self.width, self.height), [])),
+            Kernel::Chosen(neighbours) => frame.set_edges(self.joined(neighbours)),
+        }
         frame
     }
 
@@ -23,6 +28,10 @@ impl Film {
     fn develop_layer(&self, layer: Layer) -> Option<Image> {
         let (channels, source) = (layer.info().channels.len(), layer.info().source);
         if !source.is_developed(self.needs) {
+            return None;
+        }
+        let of_edges = source.record().is_some_and(|record| record.statistic().of_edges);
+        if of_edges && self.kernel != Kernel::Cross {
             return None;
         }
         if source.record().is_some_and(|record| record.is_known_zero(self.needs)) {
@@ -59,7 +68,7 @@ impl Film {
     }
 
     /// The tile of a pixel and the pixel's index in it.
-    fn at(&self, x: usize, y: usize) -> (&Tile, usize) {
+    pub(super) fn at(&self, x: usize, y: usize) -> (&Tile, usize) {
         let tile = &self.tiles[y / super::TILE * self.columns() + x / super::TILE];
         (tile, (y - tile.y) * tile.width + (x - tile.x))
     }
@@ -126,20 +135,19 @@ impl End {
 
 impl Tile {
     /// Values of a statistic at pixel `i`; none if it is sparse and zero in the whole tile.
-    fn values(&self, record: Record, i: usize) -> Option<&[f32]> {
-        let stride = record.statistic().stride();
-        self.planes[record as usize].get(i * stride..(i + 1) * stride)
+    pub(super) fn values(&self, record: Record, i: usize) -> Option<&[f32]> {
+        self.planes[record as usize].get(self.span(record.statistic(), i))
     }
 
-    fn variance(&self, record: Record, i: usize, value: usize) -> f32 {
-        let statistic: &Statistic = record.statistic();
-        let count = self.count_of(statistic.of_edges, i);
-        self.values(record, i).map_or(0.0, |values| statistic.variance_of_mean(values, value, count))
+    pub(super) fn variance(&self, record: Record, i: usize, value: usize) -> f32 {
+        let count = self.count_of(record.statistic().of_edges, i);
+        self.values(record, i).map_or(0.0, |values| Statistic::variance_of_mean(values, value, count))
     }
 
     /// Means of bin `k` at pixel `i`.
-    fn bin(&self, record: Record, i: usize, k: usize) -> &[f32] {
-        let Statistic { values, .. } = *record.statistic();
-        &self.planes[record as usize][i * record.statistic().stride() + k * values..][..values]
+    pub(super) fn bin(&self, record: Record, i: usize, k: usize) -> &[f32] {
+        let span = self.span(record.statistic(), i);
+        let count = span.len() / BINS;
+        &self.planes[record as usize][span.start + k * count..][..count]
     }
 }

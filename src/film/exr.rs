@@ -2,26 +2,23 @@
 
 use std::path::Path;
 
-use super::{Frame, Layer, Provenance, aovs};
+use super::{Frame, Layer, Provenance, aovs, edge_layers};
 use crate::error::{Error, Result};
 use crate::image::Image;
 use crate::image::io::{Kind, Pixels, read, write};
 
 /// Writes every layer of a frame, without loss.
 pub fn save(path: &Path, frame: &Frame) -> Result<()> {
-    if frame.has_own_edges() {
-        return Err(Error::io(
-            path,
-            "files hold differences to the right and downwards only, not edges between other pixels",
-        ));
-    }
     let present: Vec<_> = frame.present().collect();
-    let channels: Vec<String> = present.iter().flat_map(|(layer, _)| layer.channel_names()).collect();
+    let own_edges = frame.own_edges().map_or_else(Vec::new, edge_layers::channels);
+    let of_layers = present.iter().flat_map(|(layer, _)| layer.channel_names());
+    let channels: Vec<String> = of_layers.chain(own_edges.iter().map(|(name, _)| name.clone())).collect();
     let mut data = Vec::with_capacity(frame.width * frame.height * channels.len());
     for pixel in 0..frame.width * frame.height {
         for (_, image) in &present {
             data.extend_from_slice(&image.data[pixel * image.channels..(pixel + 1) * image.channels]);
         }
+        data.extend(own_edges.iter().map(|(_, values)| values[pixel]));
     }
     let (width, height, attributes) = (frame.width, frame.height, frame.provenance.attributes());
     write(path, &Pixels { width, height, channels, data, window: frame.window, attributes }, Kind::Float, Some("zips"))
@@ -51,6 +48,13 @@ pub fn load_counted(path: &Path, spp: Option<u32>) -> Result<Frame> {
     }
     if frame.get(Layer::Color).is_none() {
         return Err(Error::io(path, format!("no channels R, G, B among {}", pixels.channels.join(", "))));
+    }
+    let channel = |name: &str| {
+        let position = pixels.channels.iter().position(|other| other == name)?;
+        Some(pixels.data.chunks_exact(pixels.channels.len()).map(|pixel| pixel[position]).collect())
+    };
+    if let Some(edges) = edge_layers::edges(&frame, channel) {
+        frame.set_edges(edges);
     }
     frame.window = pixels.window;
     Ok(frame)

@@ -72,15 +72,15 @@ impl Frame {
         Layer::all().filter_map(|layer| Some((layer, self.get(layer)?)))
     }
 
-    /// Replaces the differences of the layers by edges between any pixels. Files hold the layers only.
+    /// Replaces the differences of the layers by edges between any pixels.
     pub fn set_edges(&mut self, edges: Edges) {
         assert_eq!(edges.pixels(), self.width * self.height, "edges of another size");
         self.edges = Some(edges);
     }
 
-    /// Whether the differences are those of [`Frame::set_edges`] instead of layers.
-    pub fn has_own_edges(&self) -> bool {
-        self.edges.is_some()
+    /// The edges of [`Frame::set_edges`], if they take the place of those of layers.
+    pub fn own_edges(&self) -> Option<&Edges> {
+        self.edges.as_ref()
     }
 
     /// Differences to the right and downwards as images. The error names the layer that is missing, or says that the

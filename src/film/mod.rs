@@ -7,11 +7,14 @@
 
 mod aovs;
 mod develop;
+mod edge_layers;
 mod edges;
 pub mod exr;
 mod frame;
+mod joined;
 pub mod layer;
 mod needs;
+mod neighbours;
 mod provenance;
 mod sample;
 mod source;
@@ -23,10 +26,13 @@ pub use self::edges::{Cross, EdgeParts, Edges, HalfEdge};
 pub use self::frame::{Frame, half};
 pub use self::layer::Layer;
 pub use self::needs::{EdgeNeed, Needs};
+pub use self::neighbours::{CROSS, Neighbours, STEPS, opposite};
 pub use self::provenance::Provenance;
-pub use self::sample::{CROSS, Differences, Features, Rejected, Sample};
+pub use self::sample::{Differences, Features, Rejected, Sample};
 pub use self::statistic::bin_count;
 pub use self::tile::Tile;
+
+use std::sync::Arc;
 
 /// Number of disjoint groups of samples, with means of their own: sample i of a pixel belongs to bin i mod 8.
 pub const BINS: usize = 8;
@@ -43,7 +49,20 @@ pub struct Film {
     pub height: usize,
     /// Statistics that are recorded.
     pub needs: Needs,
+    kernel: Kernel,
     tiles: Vec<Tile>,
+}
+
+/// The half-edges that a film records.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum Kernel {
+    /// To the four direct neighbours of every pixel.
+    #[default]
+    Cross,
+    /// None, until the neighbours are chosen.
+    Pending,
+    /// To neighbours that were chosen for every pixel.
+    Chosen(Arc<Neighbours>),
 }
 
 impl Film {
@@ -55,7 +74,27 @@ impl Film {
                 tiles.push(Tile::new((x, y), (TILE.min(width - x), TILE.min(height - y)), needs));
             }
         }
-        Self { width, height, needs, tiles }
+        Self { width, height, needs, kernel: Kernel::Cross, tiles }
+    }
+
+    /// The film without half-edges, which are recorded from when its neighbours are chosen.
+    pub fn pending(mut self) -> Self {
+        let (size, none) = ((self.width, self.height), vec![0; self.width * self.height]);
+        self.choose(Neighbours::new(size, none, false));
+        self.kernel = Kernel::Pending;
+        self
+    }
+
+    /// Chooses the neighbours that edges lead to. Edges that were recorded before are lost.
+    pub fn choose(&mut self, neighbours: Neighbours) {
+        assert_eq!(neighbours.size(), (self.width, self.height), "neighbours of another film");
+        self.tiles.iter_mut().for_each(|tile| tile.set_neighbours(self.needs, &neighbours));
+        self.kernel = Kernel::Chosen(Arc::new(neighbours));
+    }
+
+    /// The half-edges that are recorded.
+    pub fn kernel(&self) -> &Kernel {
+        &self.kernel
     }
 
     /// All tiles, to be rendered by different threads.
@@ -104,9 +143,10 @@ impl Film {
         self.tiles.iter().flat_map(|tile| &tile.rejected).map(|&count| u64::from(count)).sum()
     }
 
-    /// Adds the samples of a film of the same size and needs as if they had been taken after those here.
+    /// Adds the samples of a film of the same size, needs and kernel as if they had been taken after those here.
     pub fn merge(&mut self, other: &Self) {
         assert_eq!((self.width, self.height, self.needs), (other.width, other.height, other.needs), "films differ");
+        assert_eq!(self.kernel, other.kernel, "kernels differ");
         self.tiles.iter_mut().zip(&other.tiles).for_each(|(mine, theirs)| mine.merge(theirs));
     }
 }
@@ -125,23 +165,21 @@ mod tests {
             occlusion: 0.5 * value,
             position: Vec3::splat(value),
         };
-        let edges = [Rgb::splat(value); 4];
-        let differences = Some(Differences { color: edges, ambient: edges });
-        Sample {
-            color: vec3(value, 2.0, 0.0),
-            direct: Rgb::ONE,
-            features,
-            ambient: Rgb::splat(value),
-            alpha: 1.0,
-            differences,
-        }
+        Sample { color: vec3(value, 2.0, 0.0), direct: Rgb::ONE, features, ambient: Rgb::splat(value), alpha: 1.0 }
+    }
+
+    /// Adds sample `i` to a pixel, with differences of its size if asked for.
+    fn add(film: &mut Film, pixel: usize, i: u32, shifted: bool) {
+        let edges = [Rgb::splat(sample(i).features.depth); 4];
+        let differences = Some(Differences { color: &edges, ambient: &edges }).filter(|_| shifted);
+        film.tiles_mut()[0].add(pixel, &sample(i), differences).unwrap();
     }
 
     #[test]
     fn means_and_variances_are_those_of_the_samples() {
         let mut film = Film::new(1, 1, Needs::ALL);
         let values: Vec<f64> = (0..100).map(|i| f64::from(sample(i).color.x)).collect();
-        (0..100).for_each(|i| film.tiles_mut()[0].add(0, &sample(i)).unwrap());
+        (0..100).for_each(|i| add(&mut film, 0, i, true));
         let mean = values.iter().sum::<f64>() / 100.0;
         let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / 99.0 / 100.0;
         let frame = film.develop();
@@ -161,8 +199,8 @@ mod tests {
         let mut halves = [Film::new(1, 1, Needs::ALL), Film::new(1, 1, Needs::ALL)];
         let mut whole = Film::new(1, 1, Needs::ALL);
         for i in 0..64 {
-            halves[usize::from(i >= 24)].tiles_mut()[0].add(0, &sample(i)).unwrap();
-            whole.tiles_mut()[0].add(0, &sample(i)).unwrap();
+            add(&mut halves[usize::from(i >= 24)], 0, i, true);
+            add(&mut whole, 0, i, true);
         }
         let [mut merged, second] = halves;
         merged.merge(&second);
@@ -178,8 +216,8 @@ mod tests {
     fn samples_that_are_not_finite_count_as_zero_and_are_reported() {
         let mut film = Film::new(2, 1, Needs::ALL);
         let bad = Sample { color: vec3(f32::NAN, 1.0, 1.0), ..sample(0) };
-        assert!(film.tiles_mut()[0].add(1, &bad).is_err());
-        film.tiles_mut()[0].add(1, &Sample { color: Rgb::ONE, ..sample(0) }).unwrap();
+        assert!(film.tiles_mut()[0].add(1, &bad, None).is_err());
+        film.tiles_mut()[0].add(1, &Sample { color: Rgb::ONE, ..sample(0) }, None).unwrap();
         assert_eq!((film.rejected(), film.samples()), (1, 2));
         assert_eq!(film.develop().get(Layer::Color).unwrap().pixel(1, 0), [0.5; 3]);
     }
@@ -188,16 +226,15 @@ mod tests {
     fn edges_that_are_sampled_less_often_have_counts_of_their_own() {
         let (mut film, mut dense) = (Film::new(2, 1, Needs::ALL), Film::new(2, 1, Needs::ALL));
         for (i, pixel) in (0..32).flat_map(|i| [(i, 0), (i, 1)]) {
-            let differences = sample(i).differences.filter(|_| i % 4 == 1);
-            film.tiles_mut()[0].add(pixel, &Sample { differences, ..sample(i) }).unwrap();
+            add(&mut film, pixel, i, i % 4 == 1);
             if i % 4 == 1 {
-                dense.tiles_mut()[0].add(pixel, &sample(i)).unwrap();
+                add(&mut dense, pixel, i, true);
             }
         }
         assert_eq!((film.tiles_mut()[0].count(0), film.tiles_mut()[0].edge_count(0)), (32, 8));
         let mut bytes = Vec::new();
         film.write(&mut bytes).unwrap();
-        assert_eq!(Film::read((2, 1), Needs::ALL, &mut bytes.as_slice()).unwrap(), film);
+        assert_eq!(Film::new(2, 1, Needs::ALL).read(&mut bytes.as_slice()).unwrap(), film);
         // The edges are those of the samples that had differences, as if there had been no others.
         let (frame, dense) = (film.develop(), dense.develop());
         for layer in [Layer::Dx, Layer::DxVariance, Layer::BinDx(3), Layer::BinAmbientDx(7)] {
@@ -214,7 +251,7 @@ mod tests {
     #[test]
     fn known_zeros_are_developed_without_being_recorded() {
         let mut film = Film::new(3, 2, Needs { edges: EdgeNeed::KnownZero, ..Needs::ALL });
-        film.tiles_mut()[0].add(0, &Sample { differences: None, ..sample(1) }).unwrap();
+        add(&mut film, 0, 1, false);
         let frame = film.develop();
         assert_eq!(frame.get(Layer::BinAmbientDy(5)), None);
         for layer in [Layer::Dx, Layer::DyVariance, Layer::BinDx(2)] {

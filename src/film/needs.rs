@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::statistic::STATISTICS;
+use super::tile::CROSS;
 
 /// Statistics that a method asks for besides the colour, or that a film records.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -74,11 +75,12 @@ impl Needs {
         alpha: false,
     };
 
-    /// Bytes per pixel of a film, as long as the camera sees no emitter directly; 24 more where it does.
+    /// Bytes per pixel of a film with the edges of the cross, as long as the camera sees no emitter directly; 24 more where it
+    /// does.
     pub fn bytes_per_pixel(self) -> usize {
         let counts = size_of::<u32>() * (1 + usize::from(self.edges.is_sampled()));
         let recorded = STATISTICS.iter().filter(|statistic| (statistic.recorded)(self) && statistic.sparse.is_none());
-        counts + recorded.map(|statistic| size_of::<f32>() * statistic.stride()).sum::<usize>()
+        counts + recorded.map(|statistic| size_of::<f32>() * statistic.span(0, &CROSS).len()).sum::<usize>()
     }
 
     /// The same, with sampled differences in every sample.

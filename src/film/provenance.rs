@@ -19,6 +19,8 @@ pub struct Provenance {
     pub method: String,
     /// Summary of the plan: what was computed and what was left out.
     pub plan: String,
+    /// Neighbours that paths were shifted to, if not the cross.
+    pub kernel: String,
 }
 
 /// Prefix of the attributes' names.
@@ -26,7 +28,7 @@ const PREFIX: &str = "fluxion:";
 
 impl Provenance {
     /// Names of the attributes, in the order of the fields.
-    pub const NAMES: [&'static str; 8] = [
+    pub const NAMES: [&'static str; 9] = [
         "fluxion:version",
         "fluxion:scene",
         "fluxion:fingerprint",
@@ -35,6 +37,7 @@ impl Provenance {
         "fluxion:seconds",
         "fluxion:method",
         "fluxion:plan",
+        "fluxion:kernel",
     ];
 
     /// Provenance of something that this version of the program makes.
@@ -42,7 +45,7 @@ impl Provenance {
         Self { version: env!("CARGO_PKG_VERSION").into(), ..Self::default() }
     }
 
-    fn values(&mut self) -> [&mut String; 8] {
+    fn values(&mut self) -> [&mut String; 9] {
         [
             &mut self.version,
             &mut self.scene,
@@ -52,6 +55,7 @@ impl Provenance {
             &mut self.seconds,
             &mut self.method,
             &mut self.plan,
+            &mut self.kernel,
         ]
     }
 

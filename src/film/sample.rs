@@ -1,9 +1,7 @@
 //! The result of one camera path and of its shifted copies.
 
+use super::neighbours::STEPS;
 use crate::math::{Rgb, Vec3};
-
-/// The neighbours that a pixel's paths are shifted to, as steps in x and y. Each edge is sampled from both of its ends.
-pub const CROSS: [(i32, i32); 4] = [(1, 0), (-1, 0), (0, 1), (0, -1)];
 
 /// Auxiliary values at the first surface on the camera path that has a non-delta lobe.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -28,16 +26,17 @@ impl Features {
     }
 }
 
-/// One end's share of the differences "neighbour minus pixel", in the order of [`CROSS`]; zero across the film's border.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Differences {
+/// One end's share of the differences "neighbour minus pixel", in the order of the pixel's half-edges; zero across the film's
+/// border.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Differences<'a> {
     /// Differences of the scattered radiance.
-    pub color: [Rgb; 4],
-    /// Differences of the radiance that an ambient light would add.
-    pub ambient: [Rgb; 4],
+    pub color: &'a [Rgb],
+    /// Differences of the radiance that an ambient light would add; as many.
+    pub ambient: &'a [Rgb],
 }
 
-/// The result of one camera path and of its shifted copies.
+/// The result of one camera path.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sample {
     /// Scattered radiance: an unbiased estimate of the pixel without `direct`.
@@ -50,8 +49,6 @@ pub struct Sample {
     pub ambient: Rgb,
     /// 1 if the path has met something that does not just let it through, 0 if not.
     pub alpha: f32,
-    /// Differences to the neighbours; `None` if the path was not shifted, which leaves the edges' counts alone.
-    pub differences: Option<Differences>,
 }
 
 /// The reason for counting a sample as zero: the part of it that is not finite, or too large to be squared.
@@ -75,7 +72,7 @@ const LARGEST: f32 = 1e16;
 
 impl Sample {
     /// Fails on NaN, on infinities and on values whose variance would overflow.
-    pub(super) fn check(&self) -> Result<(), Rejected> {
+    pub(super) fn check(&self, differences: Differences) -> Result<(), Rejected> {
         let finite = |ok: bool, part| if ok { Ok(()) } else { Err(Rejected(part)) };
         let value = |value: f32| value.abs() <= LARGEST;
         let color = |color: &Rgb| color.abs().max_element() <= LARGEST && !color.is_nan();
@@ -84,30 +81,20 @@ impl Sample {
         let Features { occlusion, position, .. } = self.features;
         let mut features = self.features.surface().into_iter().chain([occlusion]).chain(position.to_array());
         finite(features.all(value), "features")?;
-        let differences =
-            |of: fn(&Differences) -> &[Rgb; 4]| self.differences.as_ref().is_none_or(|d| of(d).iter().all(color));
-        finite(color(&self.ambient) && differences(|d| &d.ambient), "ambient light")?;
-        finite(differences(|d| &d.color), "edges")
-    }
-
-    /// The sample that replaces a rejected one: zero, with differences if the rejected one has some.
-    pub(super) fn zeroed(&self) -> Self {
-        Self { differences: self.differences.map(|_| Differences::default()), ..Self::default() }
-    }
-
-    /// Differences of the scattered radiance as one vector; zero if there are none.
-    pub(super) fn color_differences(&self) -> [f32; 12] {
-        self.differences.as_ref().map_or([0.0; 12], |differences| flatten(&differences.color))
-    }
-
-    /// Differences of the ambient light as one vector; zero if there are none.
-    pub(super) fn ambient_differences(&self) -> [f32; 12] {
-        self.differences.as_ref().map_or([0.0; 12], |differences| flatten(&differences.ambient))
+        finite(color(&self.ambient) && differences.ambient.iter().all(color), "ambient light")?;
+        finite(differences.color.iter().all(color), "edges")
     }
 }
 
-fn flatten(edges: &[Rgb; 4]) -> [f32; 12] {
-    let mut flat = [0.0; 12];
-    flat.chunks_exact_mut(3).zip(edges).for_each(|(slot, edge)| slot.copy_from_slice(&edge.to_array()));
-    flat
+/// As many zeros as a pixel can have differences.
+const ZEROS: [Rgb; STEPS.len()] = [Rgb::ZERO; STEPS.len()];
+
+impl Differences<'_> {
+    /// Differences of a path that was not shifted.
+    pub const NONE: Self = Self { color: &[], ambient: &[] };
+
+    /// As many differences, all of them zero.
+    pub(super) fn zeroed(self) -> Self {
+        Self { color: &ZEROS[..self.color.len()], ambient: &ZEROS[..self.ambient.len()] }
+    }
 }

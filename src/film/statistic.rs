@@ -1,7 +1,9 @@
 //! The table of statistics: everything that a film accumulates per pixel. Tiles, checkpoint files, merging and the memory
 //! of a film are driven by it; [`layer`](super::layer) says which images are developed from which statistic.
 
-use super::{BINS, EdgeNeed, Needs, Sample};
+use std::ops::Range;
+
+use super::{BINS, Differences, EdgeNeed, Needs, Sample};
 use crate::math::Rgb;
 
 /// Rows of [`STATISTICS`].
@@ -13,7 +15,7 @@ pub(super) enum Record {
     Surface,
     Occlusion,
     Position,
-    /// One end's share of the four differences.
+    /// One end's share of the differences, of every half-edge.
     Edges,
     ColorBins,
     EdgeBins,
@@ -24,16 +26,16 @@ pub(super) enum Record {
 
 /// A statistic of every pixel.
 pub(super) struct Statistic {
-    /// Number of values in a sample.
-    pub values: usize,
+    /// Number of values in a sample, or of a half-edge.
+    values: usize,
     pub kind: Kind,
-    /// Whether it counts the samples with differences instead of all samples.
+    /// Whether it has values of every half-edge, and counts the samples with differences instead of all samples.
     pub of_edges: bool,
     /// If set, the statistic takes no memory in a tile until it says that a sample has a value other than zero.
     pub sparse: Option<fn(&Sample) -> bool>,
     /// Whether a film with these needs has it.
     pub recorded: fn(Needs) -> bool,
-    accumulate: fn(Slot, &Sample),
+    accumulate: fn(Slot, &Sample, Differences),
 }
 
 /// How samples are accumulated.
@@ -45,11 +47,11 @@ pub(super) enum Kind {
     Bins,
 }
 
-const fn moments(values: usize, recorded: fn(Needs) -> bool, accumulate: fn(Slot, &Sample)) -> Statistic {
+const fn moments(values: usize, recorded: fn(Needs) -> bool, accumulate: fn(Slot, &Sample, Differences)) -> Statistic {
     Statistic { values, kind: Kind::Moments, of_edges: false, sparse: None, recorded, accumulate }
 }
 
-const fn bins(values: usize, recorded: fn(Needs) -> bool, accumulate: fn(Slot, &Sample)) -> Statistic {
+const fn bins(values: usize, recorded: fn(Needs) -> bool, accumulate: fn(Slot, &Sample, Differences)) -> Statistic {
     Statistic { kind: Kind::Bins, ..moments(values, recorded, accumulate) }
 }
 
@@ -59,28 +61,28 @@ const fn of_edges(statistic: Statistic) -> Statistic {
 
 /// Every statistic, in the order of [`Record`] and of checkpoint files.
 pub(super) const STATISTICS: [Statistic; 11] = [
-    moments(3, |_| true, |slot, sample| slot.add(sample.color.to_array())),
+    moments(3, |_| true, |slot, sample, _| slot.add(sample.color.to_array())),
     Statistic {
         sparse: Some(|sample| sample.direct != Rgb::ZERO),
-        ..moments(3, |_| true, |slot, sample| slot.add(sample.direct.to_array()))
+        ..moments(3, |_| true, |slot, sample, _| slot.add(sample.direct.to_array()))
     },
-    moments(7, |needs| needs.features, |slot, sample| slot.add(sample.features.surface())),
-    moments(1, |needs| needs.occlusion, |slot, sample| slot.add([sample.features.occlusion])),
-    moments(3, |needs| needs.position, |slot, sample| slot.add(sample.features.position.to_array())),
-    of_edges(moments(12, |needs| needs.edges.is_sampled(), |slot, sample| slot.add(sample.color_differences()))),
-    bins(3, |needs| needs.bins, |slot, sample| slot.add_to_bin(sample.color.to_array())),
+    moments(7, |needs| needs.features, |slot, sample, _| slot.add(sample.features.surface())),
+    moments(1, |needs| needs.occlusion, |slot, sample, _| slot.add([sample.features.occlusion])),
+    moments(3, |needs| needs.position, |slot, sample, _| slot.add(sample.features.position.to_array())),
+    of_edges(moments(3, |needs| needs.edges.is_sampled(), |slot, _, differences| slot.add_colors(differences.color))),
+    bins(3, |needs| needs.bins, |slot, sample, _| slot.add_to_bin(sample.color.to_array())),
     of_edges(bins(
-        12,
+        3,
         |needs| needs.bins && needs.edges.is_sampled(),
-        |slot, sample| slot.add_to_bin(sample.color_differences()),
+        |slot, _, differences| slot.add_colors_to_bin(differences.color),
     )),
-    bins(3, |needs| needs.ambient, |slot, sample| slot.add_to_bin(sample.ambient.to_array())),
+    bins(3, |needs| needs.ambient, |slot, sample, _| slot.add_to_bin(sample.ambient.to_array())),
     of_edges(bins(
-        12,
+        3,
         |needs| needs.ambient && needs.edges.is_sampled(),
-        |slot, sample| slot.add_to_bin(sample.ambient_differences()),
+        |slot, _, differences| slot.add_colors_to_bin(differences.ambient),
     )),
-    moments(1, |needs| needs.alpha, |slot, sample| slot.add([sample.alpha])),
+    moments(1, |needs| needs.alpha, |slot, sample, _| slot.add([sample.alpha])),
 ];
 
 /// Position of a sample among those of its pixel, as the weights that means are updated with.
@@ -111,7 +113,21 @@ impl Slot<'_> {
     /// Updates means and sums of squared deviations (Welford 1962).
     #[inline(always)]
     fn add<const N: usize>(self, values: [f32; N]) {
-        let (means, deviations) = self.values.split_at_mut(N);
+        self.add_all(N, values.into_iter());
+    }
+
+    /// The same for the colours of all half-edges.
+    #[inline(always)]
+    fn add_colors(self, colors: &[Rgb]) {
+        match <&[Rgb; 4]>::try_from(colors) {
+            Ok(cross) => self.add(flatten(cross)),
+            Err(_) => self.add_all(3 * colors.len(), colors.iter().flat_map(|color| color.to_array())),
+        }
+    }
+
+    #[inline(always)]
+    fn add_all(self, count: usize, values: impl Iterator<Item = f32>) {
+        let (means, deviations) = self.values.split_at_mut(count);
         for ((mean, deviation), value) in means.iter_mut().zip(deviations).zip(values) {
             let before = value - *mean;
             *mean += before * self.ordinal.share;
@@ -122,40 +138,70 @@ impl Slot<'_> {
     /// Updates the means of the sample's bin.
     #[inline(always)]
     fn add_to_bin<const N: usize>(self, values: [f32; N]) {
-        let means = &mut self.values[N * self.ordinal.bin..][..N];
+        self.add_all_to_bin(N, values.into_iter());
+    }
+
+    /// The same for the colours of all half-edges.
+    #[inline(always)]
+    fn add_colors_to_bin(self, colors: &[Rgb]) {
+        match <&[Rgb; 4]>::try_from(colors) {
+            Ok(cross) => self.add_to_bin(flatten(cross)),
+            Err(_) => self.add_all_to_bin(3 * colors.len(), colors.iter().flat_map(|color| color.to_array())),
+        }
+    }
+
+    #[inline(always)]
+    fn add_all_to_bin(self, count: usize, values: impl Iterator<Item = f32>) {
+        let means = &mut self.values[count * self.ordinal.bin..][..count];
         means.iter_mut().zip(values).for_each(|(mean, value)| *mean += (value - *mean) * self.ordinal.bin_share);
     }
 }
 
+fn flatten(colors: &[Rgb; 4]) -> [f32; 12] {
+    let mut flat = [0.0; 12];
+    flat.chunks_exact_mut(3).zip(colors).for_each(|(slot, color)| slot.copy_from_slice(&color.to_array()));
+    flat
+}
+
 impl Statistic {
-    /// Floats per pixel.
-    pub const fn stride(&self) -> usize {
+    /// Floats that a value takes.
+    const fn floats(&self) -> usize {
         match self.kind {
-            Kind::Moments => 2 * self.values,
-            Kind::Bins => BINS * self.values,
+            Kind::Moments => 2,
+            Kind::Bins => BINS,
         }
     }
 
-    /// Adds a sample to pixel `index` of a plane.
-    pub fn add(&self, plane: &mut [f32], index: usize, ordinal: Ordinal, sample: &Sample) {
-        let values = &mut plane[index * self.stride()..][..self.stride()];
-        (self.accumulate)(Slot { values, ordinal }, sample);
+    /// The floats of pixel `index`, which has the given ones among the half-edges of its tile, in a plane.
+    pub fn span(&self, index: usize, half_edges: &Range<usize>) -> Range<usize> {
+        let first = self.values * self.floats();
+        if self.of_edges {
+            first * half_edges.start..first * half_edges.end
+        } else {
+            first * index..first * (index + 1)
+        }
+    }
+
+    /// Adds a sample to the floats of a pixel.
+    pub fn add(&self, values: &mut [f32], ordinal: Ordinal, sample: &Sample, differences: Differences) {
+        (self.accumulate)(Slot { values, ordinal }, sample, differences);
     }
 
     /// Adds the `m` samples of `other` to the `n` samples of `mine`, as if they had been taken after them.
     pub fn merge(&self, mine: &mut [f32], other: &[f32], n: u32, m: u32) {
         match self.kind {
-            Kind::Moments => self.merge_moments(mine, other, n, m),
-            Kind::Bins => self.merge_bins(mine, other, n, m),
+            Kind::Moments => Self::merge_moments(mine, other, n, m),
+            Kind::Bins => Self::merge_bins(mine, other, n, m),
         }
     }
 
     /// Pairwise update of means and sums of squared deviations (Chan et al. 1979).
-    fn merge_moments(&self, mine: &mut [f32], other: &[f32], n: u32, m: u32) {
+    fn merge_moments(mine: &mut [f32], other: &[f32], n: u32, m: u32) {
         let share = f64::from(m) / (f64::from(n) + f64::from(m));
-        let (means, deviations) = mine.split_at_mut(self.values);
-        let (other_means, other_deviations) = other.split_at(self.values);
-        for i in 0..self.values {
+        let count = mine.len() / 2;
+        let (means, deviations) = mine.split_at_mut(count);
+        let (other_means, other_deviations) = other.split_at(count);
+        for i in 0..count {
             let (mean, deviation) = (f64::from(means[i]), f64::from(deviations[i]));
             let distance = f64::from(other_means[i]) - mean;
             means[i] = (mean + distance * share) as f32;
@@ -165,23 +211,27 @@ impl Statistic {
     }
 
     /// The first of the other samples belongs to the bin after that of our last one.
-    fn merge_bins(&self, mine: &mut [f32], other: &[f32], n: u32, m: u32) {
-        for (k, other) in other.chunks_exact(self.values).enumerate() {
+    fn merge_bins(mine: &mut [f32], other: &[f32], n: u32, m: u32) {
+        let width = mine.len() / BINS;
+        if width == 0 {
+            return;
+        }
+        for (k, other) in other.chunks_exact(width).enumerate() {
             let to = (n as usize + k) % BINS;
             let (a, b) = (f64::from(bin_count(n, to)), f64::from(bin_count(m, k)));
             let share = if b > 0.0 { (b / (a + b)) as f32 } else { 0.0 };
-            let means = &mut mine[self.values * to..][..self.values];
+            let means = &mut mine[width * to..][..width];
             means.iter_mut().zip(other).for_each(|(mean, other)| *mean += (other - *mean) * share);
         }
     }
 
-    /// Variance of the mean of value `i`, from the moments of `n` samples. A single sample says nothing about its
+    /// Variance of the mean of value `i` of a pixel, from its moments of `n` samples. A single sample says nothing about its
     /// variance: its own square stands in, rather than a certainty of zero.
-    pub fn variance_of_mean(&self, values: &[f32], i: usize, n: u32) -> f32 {
+    pub fn variance_of_mean(values: &[f32], i: usize, n: u32) -> f32 {
         match n {
             0 => 0.0,
             1 => values[i] * values[i],
-            _ => (f64::from(values[self.values + i]) / (f64::from(n) * f64::from(n - 1))).max(0.0) as f32,
+            _ => (f64::from(values[values.len() / 2 + i]) / (f64::from(n) * f64::from(n - 1))).max(0.0) as f32,
         }
     }
 }
@@ -224,11 +274,11 @@ mod tests {
             (Record::Surface, 7),
             (Record::Occlusion, 1),
             (Record::Position, 3),
-            (Record::Edges, 12),
+            (Record::Edges, 3),
             (Record::ColorBins, 3),
-            (Record::EdgeBins, 12),
+            (Record::EdgeBins, 3),
             (Record::AmbientBins, 3),
-            (Record::AmbientEdgeBins, 12),
+            (Record::AmbientEdgeBins, 3),
             (Record::Alpha, 1),
         ];
         assert_eq!(names.len(), STATISTICS.len());

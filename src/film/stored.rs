@@ -4,7 +4,7 @@
 use std::io::{self, Read, Write};
 
 use super::statistic::STATISTICS;
-use super::{Film, Needs, Tile};
+use super::{Film, Tile};
 
 /// Appends a list of words with its length.
 fn put(bytes: &mut Vec<u8>, words: impl ExactSizeIterator<Item = u32>) {
@@ -42,10 +42,10 @@ impl Tile {
         self.counts = take(from, [pixels; 2])?;
         self.edge_counts = take(from, [self.edge_counts.len(); 2])?;
         self.rejected = take(from, [0, pixels])?;
-        for (statistic, plane) in STATISTICS.iter().zip(&mut self.planes).take(statistics) {
-            let full = pixels * statistic.stride();
-            let allowed = if statistic.sparse.is_some() { [0, full] } else { [plane.len(); 2] };
-            *plane = take(from, allowed)?.into_iter().map(f32::from_bits).collect();
+        for (k, statistic) in STATISTICS.iter().enumerate().take(statistics) {
+            let allowed =
+                if statistic.sparse.is_some() { [0, self.floats(statistic)] } else { [self.planes[k].len(); 2] };
+            self.planes[k] = take(from, allowed)?.into_iter().map(f32::from_bits).collect();
         }
         Ok(())
     }
@@ -62,20 +62,14 @@ impl Film {
         })
     }
 
-    /// Reads a film of the size and with the needs that it was written with.
-    pub fn read(size: (usize, usize), needs: Needs, from: &mut impl Read) -> io::Result<Self> {
-        Self::read_statistics(size, needs, STATISTICS.len(), from)
+    /// Fills an empty film of the size, needs and neighbours of the one that was written.
+    pub fn read(self, from: &mut impl Read) -> io::Result<Self> {
+        self.read_statistics(STATISTICS.len(), from)
     }
 
     /// The same of a film that was written when there were only so many statistics.
-    pub fn read_statistics(
-        (width, height): (usize, usize),
-        needs: Needs,
-        statistics: usize,
-        from: &mut impl Read,
-    ) -> io::Result<Self> {
-        let mut film = Self::new(width, height, needs);
-        film.tiles.iter_mut().try_for_each(|tile| tile.read(statistics, from))?;
-        Ok(film)
+    pub fn read_statistics(mut self, statistics: usize, from: &mut impl Read) -> io::Result<Self> {
+        self.tiles.iter_mut().try_for_each(|tile| tile.read(statistics, from))?;
+        Ok(self)
     }
 }

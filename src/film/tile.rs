@@ -1,7 +1,12 @@
 //! A square of the film: statistics of its pixels.
 
-use super::statistic::{Ordinal, STATISTICS};
-use super::{Needs, Rejected, Sample};
+use std::ops::Range;
+
+use super::statistic::{Ordinal, STATISTICS, Statistic};
+use super::{Differences, Needs, Neighbours, Rejected, Sample};
+
+/// The half-edges of the first pixel of a tile where every pixel has the four of the cross.
+pub(super) const CROSS: Range<usize> = 0..4;
 
 /// Statistics of a tile's pixels, row by row. A tile has one writer at a time, so there are no locks.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,6 +25,8 @@ pub struct Tile {
     pub(super) edge_counts: Vec<u32>,
     /// Samples of every pixel that were rejected; empty as long as there is none.
     pub(super) rejected: Vec<u32>,
+    /// Number of half-edges before those of every pixel, and of all of them; empty where every pixel has the cross's four.
+    pub(super) half_edges: Vec<u32>,
     /// Values of every pixel, one plane for each row of [`STATISTICS`]; empty when it is not recorded, and when it is
     /// sparse and all zero.
     pub(super) planes: [Vec<f32>; STATISTICS.len()],
@@ -28,12 +35,45 @@ pub struct Tile {
 impl Tile {
     pub(super) fn new((x, y): (usize, usize), (width, height): (usize, usize), needs: Needs) -> Self {
         let pixels = width * height;
-        let planes = STATISTICS.each_ref().map(|statistic| {
-            let present = (statistic.recorded)(needs) && statistic.sparse.is_none();
-            vec![0.0; if present { pixels * statistic.stride() } else { 0 }]
-        });
         let edge_counts = vec![0; if needs.edges.is_sampled() { pixels } else { 0 }];
-        Self { x, y, width, height, counts: vec![0; pixels], edge_counts, rejected: Vec::new(), planes }
+        let (counts, rejected, half_edges) = (vec![0; pixels], Vec::new(), Vec::new());
+        let planes = STATISTICS.each_ref().map(|_| Vec::new());
+        let mut tile = Self { x, y, width, height, counts, edge_counts, rejected, half_edges, planes };
+        for (k, statistic) in STATISTICS.iter().enumerate() {
+            if (statistic.recorded)(needs) && statistic.sparse.is_none() {
+                tile.planes[k] = vec![0.0; tile.floats(statistic)];
+            }
+        }
+        tile
+    }
+
+    /// Makes room for the half-edges of these neighbours, in place of those that there were.
+    pub(super) fn set_neighbours(&mut self, needs: Needs, neighbours: &Neighbours) {
+        let mut total = 0;
+        self.half_edges = vec![0];
+        for index in 0..self.counts.len() {
+            let (x, y) = self.pixel(index);
+            total += neighbours.degree(y * neighbours.size().0 + x) as u32;
+            self.half_edges.push(total);
+        }
+        self.edge_counts.fill(0);
+        for (k, statistic) in STATISTICS.iter().enumerate().filter(|(_, statistic)| statistic.of_edges) {
+            self.planes[k] = vec![0.0; if (statistic.recorded)(needs) { self.floats(statistic) } else { 0 }];
+        }
+    }
+
+    /// Floats of a statistic of all pixels.
+    pub(super) fn floats(&self, statistic: &Statistic) -> usize {
+        self.span(statistic, self.counts.len() - 1).end
+    }
+
+    /// The floats of a statistic of pixel `index`, in its plane.
+    pub(super) fn span(&self, statistic: &Statistic, index: usize) -> Range<usize> {
+        let half_edges = match self.half_edges.get(index..index + 2) {
+            Some(starts) => starts[0] as usize..starts[1] as usize,
+            None => CROSS.end * index..CROSS.end * (index + 1),
+        };
+        statistic.span(index, &half_edges)
     }
 
     /// Number of samples of pixel `index`, which is the number of its next sample.
@@ -61,34 +101,37 @@ impl Tile {
         if of_edges { self.edge_count(index) } else { self.count(index) }
     }
 
-    /// Adds a sample to pixel `index`. A sample that is not finite is counted as zero, and reported.
-    pub fn add(&mut self, index: usize, sample: &Sample) -> Result<(), Rejected> {
-        let outcome = sample.check();
+    /// Adds a sample to pixel `index`, with its differences if the path was shifted: one that was not leaves the counts of edges
+    /// alone. A sample that is not finite is counted as zero, and reported.
+    pub fn add(&mut self, index: usize, sample: &Sample, differences: Option<Differences>) -> Result<(), Rejected> {
+        let outcome = sample.check(differences.unwrap_or(Differences::NONE));
         if outcome.is_err() {
             self.rejected.resize(self.counts.len(), 0);
             self.rejected[index] += 1;
-            self.accumulate(index, &sample.zeroed());
+            self.accumulate(index, &Sample::default(), differences.map(Differences::zeroed));
         } else {
-            self.accumulate(index, sample);
+            self.accumulate(index, sample, differences);
         }
         outcome
     }
 
-    fn accumulate(&mut self, index: usize, sample: &Sample) {
+    fn accumulate(&mut self, index: usize, sample: &Sample, differences: Option<Differences>) {
         let ordinals = [false, true].map(|of_edges| Ordinal::after(self.count_of(of_edges, index)));
-        for (statistic, plane) in STATISTICS.iter().zip(&mut self.planes) {
-            if plane.is_empty() {
+        for (k, statistic) in STATISTICS.iter().enumerate() {
+            if self.planes[k].is_empty() {
                 if !statistic.sparse.is_some_and(|nonzero| nonzero(sample)) {
                     continue;
                 }
-                plane.resize(self.counts.len() * statistic.stride(), 0.0);
+                self.planes[k] = vec![0.0; self.floats(statistic)];
             }
-            if !statistic.of_edges || sample.differences.is_some() {
-                statistic.add(plane, index, ordinals[usize::from(statistic.of_edges)], sample);
+            if !statistic.of_edges || differences.is_some() {
+                let (span, ordinal) = (self.span(statistic, index), ordinals[usize::from(statistic.of_edges)]);
+                let differences = differences.unwrap_or(Differences::NONE);
+                statistic.add(&mut self.planes[k][span], ordinal, sample, differences);
             }
         }
         self.counts[index] += 1;
-        if let (Some(count), true) = (self.edge_counts.get_mut(index), sample.differences.is_some()) {
+        if let (Some(count), true) = (self.edge_counts.get_mut(index), differences.is_some()) {
             *count += 1;
         }
     }
@@ -102,11 +145,13 @@ impl Tile {
             mine.resize(length, 0.0);
             let zeros = if other.planes[k].is_empty() { vec![0.0; length] } else { Vec::new() };
             let theirs = if other.planes[k].is_empty() { &zeros } else { &other.planes[k] };
-            let pixels = mine.chunks_exact_mut(statistic.stride()).zip(theirs.chunks_exact(statistic.stride()));
-            for (index, (mine, theirs)) in pixels.enumerate() {
-                let [n, m] = [&*self, other].map(|tile| tile.count_of(statistic.of_edges, index));
-                if m > 0 {
-                    statistic.merge(mine, theirs, n, m);
+            if length > 0 {
+                for index in 0..self.counts.len() {
+                    let [n, m] = [&*self, other].map(|tile| tile.count_of(statistic.of_edges, index));
+                    if m > 0 {
+                        let span = self.span(statistic, index);
+                        statistic.merge(&mut mine[span.clone()], &theirs[span], n, m);
+                    }
                 }
             }
             self.planes[k] = mine;

@@ -49,7 +49,7 @@ impl Reconstruction for L2 {
     fn reconstruct(&self, frame: &Frame, context: &Context) -> Result<Solution> {
         check_memory(frame, context, METHOD.id, BYTES)?;
         let image = match frame.cross() {
-            Err(_) if frame.has_own_edges() => self.by_multigrid(frame)?,
+            Err(_) if frame.own_edges().is_some() => self.by_multigrid(frame)?,
             cross => self.by_cosines(frame.require(Layer::Color)?, &cross?),
         };
         Ok(Solution { image, alpha: None, error: None, notes: Vec::new() })

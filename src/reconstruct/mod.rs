@@ -84,6 +84,11 @@ pub trait Reconstruction: Send + Sync {
         false
     }
 
+    /// Whether it takes differences to the four direct neighbours only, instead of those to any pixels.
+    fn needs_cross(&self) -> bool {
+        false
+    }
+
     /// A quicker method with much the same error, if there is one: it serves between passes of adaptive sampling.
     fn guide(&self) -> Option<&dyn Reconstruction> {
         None
@@ -192,6 +197,22 @@ pub fn parse(text: &str) -> Result<Box<dyn Reconstruction>> {
     (method.make)(&Parameters::parse(method, values)?)
 }
 
+/// Checks the values of edges that are none of a layer.
+fn check_edges(frame: &Frame) -> Result<()> {
+    let Some(edges) = frame.own_edges() else { return Ok(()) };
+    let binned = edges.bins.iter().chain(&edges.ambient).flatten();
+    let wrong = match edges.variance.iter().find(|variance| !variance.is_finite() || variance.min_element() < 0.0) {
+        Some(_) => Some("variance"),
+        None => edges.mean.iter().chain(binned).find(|value| !value.is_finite()).map(|_| "difference"),
+    };
+    match wrong {
+        Some(what) => {
+            Err(Error::BadData(format!("the frame has a {what} between chosen neighbours that is no possible one")))
+        }
+        None => Ok(()),
+    }
+}
+
 /// Reconstructs a frame: checks that its values make sense, and adds the directly seen emitters to the method's image.
 pub fn solve(method: &dyn Reconstruction, frame: &Frame, context: &Context) -> Result<Solution> {
     for (layer, image) in frame.present() {
@@ -204,6 +225,7 @@ pub fn solve(method: &dyn Reconstruction, frame: &Frame, context: &Context) -> R
             return Err(Error::BadData(what));
         }
     }
+    check_edges(frame)?;
     let mut solution = method.reconstruct(frame, context)?;
     if let Some(direct) = frame.get(Layer::Direct) {
         solution.image.add(direct);

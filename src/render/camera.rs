@@ -41,10 +41,12 @@ impl<'a> CameraSamples<'a> {
         hashes
     }
 
-    /// Camera rays through sixteen film positions: those of the pixels from `first` on, `step` pixels beside them.
-    pub fn rays(&self, scene: &Scene, first: usize, hashes: Bits, step: Vec2) -> Rays {
+    /// Camera rays through sixteen film positions: those of the pixels from `first` on, as many pixels beside them as `steps` says
+    /// for each, if it does.
+    pub fn rays(&self, scene: &Scene, first: usize, hashes: Bits, steps: &[(i32, i32)]) -> Rays {
         let mut at = [Lanes::ZERO; 2];
         for (lane, &(x, y)) in self.pixels[first..].iter().take(LANES).enumerate() {
+            let step = steps.get(lane).map_or(Vec2::ZERO, |&(x, y)| vec2(x as f32, y as f32));
             let film = vec2(x as f32, y as f32) + self.film + step;
             (at[0].0[lane], at[1].0[lane]) = film.into();
         }

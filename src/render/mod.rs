@@ -13,6 +13,7 @@ mod direct;
 mod emission;
 mod features;
 pub mod gradient;
+mod half_edges;
 mod paths;
 mod per_tile;
 mod record;

@@ -12,7 +12,9 @@ use super::per_tile::PerTile;
 use super::seen;
 use super::thinning::Shares;
 use super::wave::Wave;
-use crate::film::{EdgeNeed, Film, Needs, Rejected, Sample, TILE, Tile};
+use crate::film::{EdgeNeed, Film, Kernel, Needs, Rejected, Sample, TILE, Tile};
+use crate::math::Rgb;
+use crate::neighbours::Selector;
 use crate::scene::Scene;
 
 /// Limit of a render.
@@ -38,12 +40,14 @@ pub struct RenderSettings {
     pub needs: Needs,
     /// Shift mapping that samples the differences.
     pub shift: Shift,
+    /// Neighbours that paths are shifted to.
+    pub kernel: Selector,
 }
 
 impl RenderSettings {
-    /// Seed 0 and the default shift.
+    /// Seed 0, the default shift and the cross.
     pub fn new(budget: Budget, needs: Needs) -> Self {
-        Self { budget, seed: 0, first: 0, needs, shift: Shift::default() }
+        Self { budget, seed: 0, first: 0, needs, shift: Shift::default(), kernel: Selector::default() }
     }
 }
 
@@ -171,8 +175,25 @@ fn next_round(budget: Budget, done: u32, elapsed: Duration) -> Option<u32> {
 /// Goal of a round: the number of samples of the pixel in a column and row.
 type Goals<'a> = &'a (dyn Fn(usize, usize) -> u32 + Sync);
 
-/// Renders a round, with pauses for checkpoints.
+/// Renders a round. Neighbours are chosen as soon as all pixels have the samples of the pilot, from which on there are differences.
 fn run_round(scene: &Scene, settings: RenderSettings, control: &Control, outcome: &mut RenderOutcome, goals: Goals) {
+    let kernel = settings.kernel;
+    let fresh = *outcome.film.kernel() == Kernel::Cross && outcome.film.samples() == 0;
+    if fresh && settings.needs.edges.is_sampled() && !kernel.is_cross() {
+        outcome.film = Film::new(outcome.film.width, outcome.film.height, outcome.film.needs).pending();
+    }
+    if *outcome.film.kernel() == Kernel::Pending {
+        run_to(scene, settings, control, outcome, &|x, y| goals(x, y).min(kernel.pilot()));
+        if outcome.stopped || outcome.spp < kernel.pilot() {
+            return;
+        }
+        outcome.film.choose(kernel.select(&outcome.film.develop(), settings.shift.is_one_sided()));
+    }
+    run_to(scene, settings, control, outcome, goals);
+}
+
+/// Renders up to some goals, with pauses for checkpoints.
+fn run_to(scene: &Scene, settings: RenderSettings, control: &Control, outcome: &mut RenderOutcome, goals: Goals) {
     let (before, start) = (outcome.elapsed, Instant::now());
     let mut paused = true;
     while paused {
@@ -197,15 +218,20 @@ fn run_tiles(
 ) -> bool {
     let first_rejected = Mutex::new(outcome.first_rejected);
     let due = AtomicBool::new(false);
+    let kernel = outcome.film.kernel().clone();
+    let neighbours = if let Kernel::Chosen(neighbours) = &kernel { Some(&**neighbours) } else { None };
     let tiles = outcome.film.tiles_mut();
     let (total, done) = (tiles.len(), Mutex::new(0));
-    let wave_of = || Wave::new(scene, settings.needs, settings.shift);
+    let wave_of = || Wave::new(scene, settings.needs, settings.shift, neighbours);
+    let pending = kernel == Kernel::Pending;
     tiles.par_iter_mut().enumerate().for_each_init(wave_of, |wave, (number, tile)| {
         if control.stop.load(Ordering::Relaxed) || due.load(Ordering::Relaxed) {
             return;
         }
         let before = tile.samples();
-        if let Some(rejected) = run_tile(settings, wave, (tile, number), &outcome.choices, (goals, control.stop)) {
+        if let Some(rejected) =
+            run_tile(settings, wave, (tile, number), (&outcome.choices, pending), (goals, control.stop))
+        {
             let mut first = first_rejected.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
             first.get_or_insert(rejected);
         }
@@ -225,12 +251,13 @@ fn run_tiles(
 /// Samples of a tile's pixels after which it ends early where that is asked for: as many as are soon done.
 const SOON: u32 = 256;
 
-/// Takes the samples that the pixels of a tile lack. Returns the first that was rejected.
+/// Takes the samples that the pixels of a tile lack, without differences while neighbours are `pending`. Returns the first that was
+/// rejected.
 fn run_tile(
     settings: RenderSettings,
     wave: &mut Wave,
     (tile, number): (&mut Tile, usize),
-    choices: &Choices,
+    (choices, pending): (&Choices, bool),
     (goals, stop): (Goals, &AtomicBool),
 ) -> Option<(SampleId, Rejected)> {
     let mut first_rejected = None;
@@ -257,32 +284,48 @@ fn run_tile(
         cells.clear();
         cells.extend(numbers.iter().filter_map(|&pixel| all_cells.get(pixel).copied()));
         let id = (settings.seed, settings.first + index);
-        let differences = settings.needs.edges != EdgeNeed::Thinned
-            || choices.shares.has_differences(number, id.1, || {
+        let mut pays = || {
+            choices.shares.has_differences(number, id.1, || {
                 wave.trace((settings.seed, 0), &all, &[], true);
                 wave.work()
-            });
+            })
+        };
+        let differences = !pending && (settings.needs.edges != EdgeNeed::Thinned || pays());
         let samples = wave.trace(id, &pixels, &cells, differences);
-        for ((&pixel, &(x, y)), sample) in numbers.iter().zip(&pixels).zip(samples) {
-            if let Err(reason) = tile.add(pixel, sample) {
+        for (k, (&pixel, &(x, y))) in numbers.iter().zip(&pixels).enumerate() {
+            if let Err(reason) = tile.add(pixel, &samples.all[k], samples.differences(k)) {
                 first_rejected
                     .get_or_insert((SampleId { seed: settings.seed, x, y, index: settings.first + index }, reason));
             }
         }
-        if id.1 == 0 && pixels.len() == all.len() {
+        if id.1 == 0 && pixels.len() == all.len() && !pending {
             choices.shares.learn(number, wave.work());
         }
     }
     first_rejected
 }
 
+/// A single sample with its differences to the cross.
+#[derive(Clone, Debug)]
+pub struct Replayed {
+    /// The sample.
+    pub sample: Sample,
+    /// Differences of the scattered radiance to the right, left, down and up.
+    pub color_differences: Vec<Rgb>,
+    /// Differences of the ambient light, likewise.
+    pub ambient_differences: Vec<Rgb>,
+}
+
 /// A single sample with everything that can be recorded of it, the same as in a render of the whole film.
-pub fn sample(scene: &Scene, id: SampleId, shift: Shift) -> Sample {
+pub fn sample(scene: &Scene, id: SampleId, shift: Shift) -> Replayed {
     let (x, y) = (id.x / TILE * TILE, id.y / TILE * TILE);
     let (width, height) = (TILE.min(scene.sensor().width - x), TILE.min(scene.sensor().height - y));
     let pixels: Vec<_> = (0..width * height).map(|pixel| (x + pixel % width, y + pixel / width)).collect();
     let grids = seen::grids(scene, &pixels);
-    Wave::new(scene, Needs::ALL, shift).trace((id.seed, id.index), &pixels, &grids, true)[(id.y - y) * width + id.x - x]
+    let mut wave = Wave::new(scene, Needs::ALL, shift, None);
+    let (samples, at) = (wave.trace((id.seed, id.index), &pixels, &grids, true), (id.y - y) * width + id.x - x);
+    let [color, ambient] = samples.differences(at).map_or([&[][..]; 2], |found| [found.color, found.ambient]);
+    Replayed { sample: samples.all[at], color_differences: color.to_vec(), ambient_differences: ambient.to_vec() }
 }
 
 #[cfg(test)]

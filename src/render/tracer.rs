@@ -7,8 +7,8 @@ use super::paths::{Order, Packet, Paths};
 use super::record::PathRecord;
 use super::vertices::Vertices;
 use crate::film::Needs;
+use crate::math::Rgb;
 use crate::math::lanes::{LANES, Lanes, Lanes3, Mask};
-use crate::math::{Rgb, Vec2};
 use crate::scene::closure::KINDS;
 use crate::scene::packet::Hits;
 use crate::scene::{Integrator, Scene};
@@ -29,11 +29,19 @@ impl<'a> PathTracer<'a> {
         Self { scene, needs, paths: Paths::default(), next: Paths::default(), order: Order::default() }
     }
 
-    /// Traces paths from `step` pixels beside the camera samples. `keep_all`: record the vertices of all depths instead of
-    /// the latest only.
-    pub fn trace(&mut self, camera: &CameraSamples, step: Vec2, keep_all: bool, record: &mut PathRecord) {
+    /// Traces paths from the camera samples. `keep_all`: record the vertices of all depths instead of the latest only.
+    pub fn trace(&mut self, camera: &CameraSamples, keep_all: bool, record: &mut PathRecord) {
+        self.trace_from(camera, &[], keep_all, record);
+    }
+
+    /// Traces paths from as many pixels beside the camera samples as `steps` says, one for each.
+    pub fn trace_beside(&mut self, camera: &CameraSamples, steps: &[(i32, i32)], record: &mut PathRecord) {
+        self.trace_from(camera, steps, false, record);
+    }
+
+    fn trace_from(&mut self, camera: &CameraSamples, steps: &[(i32, i32)], keep_all: bool, record: &mut PathRecord) {
         record.start(camera.pixels.len());
-        self.start(camera, step);
+        self.start(camera, steps);
         let mut depth = 0;
         while self.paths.len() > 0 {
             record.packets.push(self.paths.len().div_ceil(LANES));
@@ -45,13 +53,13 @@ impl<'a> PathTracer<'a> {
         }
     }
 
-    /// Starts a path at every camera sample.
-    fn start(&mut self, camera: &CameraSamples, step: Vec2) {
+    /// Starts a path at every camera sample, or beside it.
+    fn start(&mut self, camera: &CameraSamples, steps: &[(i32, i32)]) {
         let count = camera.pixels.len();
         self.paths.clear();
         for first in (0..count).step_by(LANES) {
             let hash = camera.hashes(first);
-            let rays = camera.rays(self.scene, first, hash, step);
+            let rays = camera.rays(self.scene, first, hash, steps.get(first..).unwrap_or_default());
             for lane in 0..LANES.min(count - first) {
                 let (packet, _) = self.paths.push();
                 packet.id.0[lane] = (first + lane) as u32;

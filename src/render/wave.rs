@@ -3,13 +3,14 @@
 use super::camera::CameraSamples;
 use super::features;
 use super::gradient::{Shift, ShiftMapping};
+use super::half_edges::HalfEdges;
 use super::record::PathRecord;
 use super::seen;
 use super::thinning::Work;
 use super::tracer::PathTracer;
-use crate::film::{Differences, Needs, Sample};
+use crate::film::{Differences, Needs, Neighbours, Sample};
 use crate::math::lanes::LANES;
-use crate::math::{Vec2, vec2};
+use crate::math::vec2;
 use crate::scene::Scene;
 use crate::scene::packet::Surfaces;
 
@@ -17,18 +18,36 @@ use crate::scene::packet::Surfaces;
 pub struct Wave<'a> {
     tracer: PathTracer<'a>,
     shift: Option<Box<dyn ShiftMapping>>,
+    neighbours: Option<&'a Neighbours>,
     record: PathRecord,
+    half_edges: HalfEdges,
     occlusion: bool,
     surfaces: Surfaces,
 }
 
+/// The samples of a wave, in the order of its pixels.
+pub struct Samples<'a> {
+    /// The samples.
+    pub all: &'a [Sample],
+    half_edges: Option<&'a HalfEdges>,
+}
+
+impl<'a> Samples<'a> {
+    /// The differences that a sample came with, if its path was shifted.
+    pub fn differences(&self, index: usize) -> Option<Differences<'a>> {
+        self.half_edges.map(|half_edges| half_edges.differences(index))
+    }
+}
+
 impl<'a> Wave<'a> {
-    /// Waves that compute what a film with these needs records.
-    pub fn new(scene: &'a Scene, needs: Needs, shift: Shift) -> Self {
+    /// Waves that compute what a film with these needs records, with differences to chosen neighbours or to those of the cross.
+    pub fn new(scene: &'a Scene, needs: Needs, shift: Shift, neighbours: Option<&'a Neighbours>) -> Self {
         Self {
             tracer: PathTracer::new(scene, needs),
             shift: needs.edges.is_sampled().then(|| shift.mapping(needs.ambient)),
+            neighbours,
             record: PathRecord::default(),
+            half_edges: HalfEdges::default(),
             occlusion: needs.occlusion,
             surfaces: Surfaces::default(),
         }
@@ -47,14 +66,15 @@ impl<'a> Wave<'a> {
         pixels: &[(usize, usize)],
         grids: &[u32],
         differences: bool,
-    ) -> &[Sample] {
+    ) -> Samples<'_> {
         let camera = CameraSamples::new(self.tracer.scene, seed, index, pixels);
         let mut shift = self.shift.as_mut().filter(|_| differences);
         let keep_all = shift.as_ref().is_some_and(|shift| shift.needs_vertices());
-        self.tracer.trace(&camera, Vec2::ZERO, keep_all, &mut self.record);
+        self.tracer.trace(&camera, keep_all, &mut self.record);
+        let shifted = shift.is_some();
         if let Some(shift) = &mut shift {
-            self.record.samples.iter_mut().for_each(|sample| sample.differences = Some(Differences::default()));
-            shift.shift(&mut self.tracer, &camera, &mut self.record);
+            self.half_edges.start(&camera, self.neighbours);
+            shift.shift(&mut self.tracer, &camera, &mut self.record, &mut self.half_edges);
         }
         if grids.iter().any(|&side| side > 1) {
             seen::refine(self.tracer.scene, &camera, grids, &mut self.record.samples, &mut self.surfaces);
@@ -68,7 +88,7 @@ impl<'a> Wave<'a> {
                 }
             }
         }
-        &self.record.samples
+        Samples { all: &self.record.samples, half_edges: shifted.then_some(&self.half_edges) }
     }
 
     /// Work of the latest wave.

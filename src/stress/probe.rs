@@ -78,7 +78,7 @@ impl Probe {
     }
 
     fn film(&self, run: u64, needs: Needs, shift: Shift) -> Film {
-        let settings = RenderSettings { budget: Budget::Spp(self.spp), seed: run, first: 0, needs, shift };
+        let settings = RenderSettings { seed: run, shift, ..RenderSettings::new(Budget::Spp(self.spp), needs) };
         let control = Control { stop: &AtomicBool::new(false), progress: &|_| {}, sink: None };
         render(&self.scene, settings, &control).film
     }

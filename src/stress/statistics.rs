@@ -29,25 +29,24 @@ fn samples(checks: &mut Checks) -> Result<()> {
         ("1e15", 1e15),
         ("1e-42", 1e-42),
     ] {
-        type Set = fn(&mut Sample, f32);
+        type Set = fn(&mut Sample, &mut [Rgb], f32);
         let fields: [(&str, Set); 4] = [
-            ("color", |sample, bad| sample.color.y = bad),
-            ("direct", |sample, bad| sample.direct.y = bad),
-            ("depth", |sample, bad| sample.features.depth = bad),
-            ("edges", |sample, bad| {
-                sample.differences.iter_mut().for_each(|differences| differences.color[2].x = bad);
-            }),
+            ("color", |sample, _, bad| sample.color.y = bad),
+            ("direct", |sample, _, bad| sample.direct.y = bad),
+            ("depth", |sample, _, bad| sample.features.depth = bad),
+            ("edges", |_, edges, bad| edges[2].x = bad),
         ];
         for (field, set) in fields {
             let mut film = Film::new(1, 1, Needs::ALL);
             for i in 0..64 {
-                let differences = Some(Differences::default());
-                let mut sample = Sample { color: Rgb::splat(random(1, i)), differences, ..Sample::default() };
+                let mut edges = [Rgb::ZERO; 4];
+                let mut sample = Sample { color: Rgb::splat(random(1, i)), ..Sample::default() };
                 if i == 20 {
-                    set(&mut sample, bad);
+                    set(&mut sample, &mut edges, bad);
                 }
                 // Rejected or not: what is left must be numbers.
-                let _ = film.tiles_mut()[0].add(0, &sample);
+                let differences = Differences { color: &edges, ambient: &[Rgb::ZERO; 4] };
+                let _ = film.tiles_mut()[0].add(0, &sample, Some(differences));
             }
             let frame = film.develop();
             let bad = frame.present().filter(|(_, image)| image.not_finite().is_some()).count();
@@ -66,7 +65,7 @@ fn many(checks: &mut Checks) -> Result<()> {
         for i in 0..count {
             let value = mean + spread * random(2, i);
             let sample = Sample { color: Rgb::splat(value), ..Sample::default() };
-            let _ = film.tiles_mut()[0].add(0, &sample);
+            let _ = film.tiles_mut()[0].add(0, &sample, None);
             let apart = f64::from(value) - f64::from(mean);
             (sum, squares) = (sum + apart, squares + apart * apart);
         }
@@ -92,9 +91,9 @@ fn merge(checks: &mut Checks) -> Result<()> {
         let mut film = Film::new(1, 1, Needs::ALL);
         for i in range {
             let color = Rgb::splat(random(3, i));
-            let differences = Some(Differences { color: [color; 4], ..Differences::default() });
-            let sample = Sample { color, direct: color * 2.0, differences, ..Sample::default() };
-            let _ = film.tiles_mut()[0].add(0, &sample);
+            let differences = Differences { color: &[color; 4], ambient: &[Rgb::ZERO; 4] };
+            let sample = Sample { color, direct: color * 2.0, ..Sample::default() };
+            let _ = film.tiles_mut()[0].add(0, &sample, Some(differences));
         }
         film
     };

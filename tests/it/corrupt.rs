@@ -162,6 +162,7 @@ fn checkpoints() {
         size: (19, 17),
         needs: Needs::ALL,
         shift: Shift::default(),
+        kernel: fluxion::neighbours::Selector::default(),
         runs: vec![Run { seed: 1, first: 0, samples: 9 }],
     };
     checkpoint::save(&path, &origin, &outcome, None).unwrap();

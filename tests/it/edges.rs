@@ -105,9 +105,28 @@ fn methods_on_a_grid_say_that_they_need_the_cross() {
     let frame = frame(&picture(SIZE), random_edges());
     let message = run("frgr", &frame).unwrap_err().to_string();
     assert!(message.contains("dx.R") && message.contains("between other pixels"), "{message}");
+}
+
+#[test]
+fn edges_survive_files_to_the_bit() {
+    let edges = random_edges();
+    let mut written = frame(&picture(SIZE), edges);
     let folder = tempfile::tempdir().unwrap();
-    let message = fluxion::exr::save(&folder.path().join("a.exr"), &frame).unwrap_err().to_string();
-    assert!(message.contains("a.exr") && message.contains("right and downwards only"), "{message}");
+    let path = folder.path().join("a.exr");
+    fluxion::exr::save(&path, &written).unwrap();
+    let read = fluxion::exr::load(&path).unwrap();
+    // Weights are no part of files, and counts are those of the pixels.
+    let mut expected = written.own_edges().unwrap().clone();
+    let samples = written.get(Layer::Samples).unwrap().data[0] as u32;
+    (expected.weights, expected.counts) = (Vec::new(), vec![samples; expected.len()]);
+    written.set_edges(expected);
+    assert!(read.own_edges() == written.own_edges());
+    // Values that cannot be are refused.
+    let mut wrong = written.own_edges().unwrap().clone();
+    wrong.variance[7].y = -1.0;
+    written.set_edges(wrong);
+    let message = run("l2", &written).unwrap_err().to_string();
+    assert!(message.contains("variance between chosen neighbours"), "{message}");
 }
 
 #[test]

@@ -17,7 +17,7 @@ use fluxion::render::{self, Budget, CheckpointSink, Control, RenderOutcome, Rend
 use fluxion::scene::Scene;
 
 fn settings(spp: u32, needs: Needs) -> RenderSettings {
-    RenderSettings { budget: Budget::Spp(spp), seed: 7, first: 0, needs, shift: Shift::default() }
+    RenderSettings { seed: 7, ..RenderSettings::new(Budget::Spp(spp), needs) }
 }
 
 fn origin(scene: &Scene, seed: u64, needs: Needs) -> Origin {
@@ -31,6 +31,7 @@ fn origin(scene: &Scene, seed: u64, needs: Needs) -> Origin {
         size: (scene.sensor().width, scene.sensor().height),
         needs,
         shift: Shift::default(),
+        kernel: fluxion::neighbours::Selector::default(),
         runs: vec![Run { seed, first: 0, samples: 0 }],
     }
 }
@@ -399,5 +400,5 @@ fn samples_of_a_first_number_are_those_of_the_whole() {
     let late = render(&scene, RenderSettings { first: 3, ..settings(1, Needs::default()) }, &control).film.develop();
     let id = render::SampleId { seed: 7, x: 5, y: 9, index: 3 };
     let one = render::sample(&scene, id, Shift::default());
-    assert_eq!(late.get(Layer::Color).unwrap().rgb(5, 9), one.color);
+    assert_eq!(late.get(Layer::Color).unwrap().rgb(5, 9), one.sample.color);
 }

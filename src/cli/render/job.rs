@@ -6,6 +6,7 @@ use anyhow::Result;
 use fluxion::adaptive::{self, ALLOCATORS, AdaptiveOutcome, AdaptiveSettings, Limits, Start};
 use fluxion::film::{Frame, Needs, Provenance, exr};
 use fluxion::image::io::{DataWindow, failed_lookups};
+use fluxion::neighbours::Selector;
 use fluxion::reconstruct::{Reconstruction, Solution};
 use fluxion::reference::fingerprint;
 use fluxion::render::{self, Budget, Control, RenderOutcome, RenderSettings, SampleId};
@@ -23,6 +24,7 @@ pub struct Job<'a> {
     pub args: &'a Args,
     pub scene: &'a Scene,
     pub method: &'a dyn Reconstruction,
+    pub kernel: Selector,
     pub sink: Option<&'a CheckpointWriter<'a>>,
 }
 
@@ -58,7 +60,8 @@ impl Job<'_> {
     }
 
     fn settings(&self, needs: Needs, budget: Budget) -> RenderSettings {
-        RenderSettings { budget, seed: self.args.seed, first: self.args.first, needs, shift: shift(self.args) }
+        let (seed, first, shift, kernel) = (self.args.seed, self.args.first, shift(self.args), self.kernel);
+        RenderSettings { budget, seed, first, needs, shift, kernel }
     }
 
     /// Runs something long under a progress bar; an interrupt stops it.
@@ -176,6 +179,7 @@ impl Job<'_> {
             seconds: format!("{:.3}", stats.seconds.render),
             method: self.args.method.method.clone(),
             plan: stats.plan.clone(),
+            kernel: if self.kernel.is_cross() { String::new() } else { self.kernel.to_string() },
             ..Provenance::new()
         }
     }

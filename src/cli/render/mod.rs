@@ -13,6 +13,7 @@ use fluxion::adaptive::{ALLOCATORS, Allocator, Start};
 use fluxion::checkpoint::{Origin, Run, content};
 use fluxion::error::Error;
 use fluxion::film::Needs;
+use fluxion::neighbours::Selector;
 use fluxion::plan::Plan;
 use fluxion::reference::fingerprint;
 use fluxion::render::{self, RenderOutcome, SHIFTS, SampleId, Shift};
@@ -21,7 +22,7 @@ use fluxion::scene::{Scene, load};
 use self::job::Job;
 use super::outputs::Claims;
 use super::stats::Stats;
-use super::{checkpoint, method, progress, stats};
+use super::{checkpoint, kernel, method, progress, stats};
 use crate::cli::terminal::{note, out};
 
 /// Options of `render`.
@@ -91,6 +92,8 @@ pub struct Args {
     /// Samples in which paths are shifted
     #[arg(long, default_value = "auto", value_enum, hide_short_help = true, value_name = "WHEN")]
     differences: Shifted,
+    #[command(flatten)]
+    kernel: kernel::Args,
     /// Roughness above which `reconnect` connects paths at a material instead of copying half vectors
     #[arg(long, value_name = "ALPHA", hide_short_help = true)]
     shift_threshold: Option<f32>,
@@ -146,10 +149,12 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     if scene.emitters().is_empty() {
         note!("warning: nothing in {} emits light: the image is black", args.scene.display());
     }
+    let kernel = args.kernel.make(method.as_ref(), args.spp.or(args.time.is_none().then_some(scene.sensor().spp)))?;
     let needed = match args.differences {
         Shifted::Always => method.needs().with_every_difference(),
         Shifted::Auto => method.needs(),
     };
+    let needed = kernel::needs(needed, &kernel);
     let saved = match &args.layers {
         Some(_) => Needs {
             features: true,
@@ -173,14 +178,14 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     if let Some(sample) = args.replay {
         return replay(args, &scene, sample);
     }
-    let origin = args.checkpoint.checkpoint.as_ref().map(|_| origin(args, &scene, &plan)).transpose()?;
+    let origin = args.checkpoint.checkpoint.as_ref().map(|_| origin(args, &scene, &plan, kernel)).transpose()?;
     let journal = Mutex::default();
     let start = match origin.as_ref().map(|origin| args.checkpoint.load(origin)).transpose()?.flatten() {
         Some(checkpoint) => checkpoint.resume(&journal),
         None => Start { render: RenderOutcome::new(&scene, plan.needs), journal: &journal },
     };
     let sink = origin.and_then(|origin| args.checkpoint.sink(origin, &start));
-    let done = Job { args, scene: &scene, method: method.as_ref(), sink: sink.as_ref() }.run(start, &mut stats);
+    let done = Job { args, scene: &scene, method: method.as_ref(), kernel, sink: sink.as_ref() }.run(start, &mut stats);
     match &sink {
         Some(sink) => sink.conclude(done)?,
         None => done?,
@@ -190,7 +195,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
 }
 
 /// Origin of the film that is going to be rendered.
-fn origin(args: &Args, scene: &Scene, plan: &Plan) -> Result<Origin> {
+fn origin(args: &Args, scene: &Scene, plan: &Plan, kernel: Selector) -> Result<Origin> {
     Ok(Origin {
         version: env!("CARGO_PKG_VERSION").into(),
         scene: args.scene.file_name().unwrap_or_default().to_string_lossy().into_owned(),
@@ -201,6 +206,7 @@ fn origin(args: &Args, scene: &Scene, plan: &Plan) -> Result<Origin> {
         size: (scene.sensor().width, scene.sensor().height),
         needs: plan.needs,
         shift: shift(args),
+        kernel,
         runs: vec![Run { seed: args.seed, first: args.first, samples: 0 }],
     })
 }

@@ -93,6 +93,10 @@ impl Reconstruction for Blend {
         true
     }
 
+    fn needs_cross(&self) -> bool {
+        true
+    }
+
     fn guide(&self) -> Option<&dyn Reconstruction> {
         self.methods.last().and_then(|(method, _)| method.guide())
     }
@@ -101,7 +105,7 @@ impl Reconstruction for Blend {
         check_memory(frame, context, METHOD.id, BYTES)?;
         let inputs = Inputs::new(frame, 1)?;
         // What is missing is said before the work.
-        if !frame.has_own_edges() {
+        if frame.own_edges().is_none() {
             frame.cross()?;
         }
         frame.require(Layer::Albedo)?;

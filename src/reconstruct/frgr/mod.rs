@@ -124,6 +124,10 @@ impl Reconstruction for Frgr {
         true
     }
 
+    fn needs_cross(&self) -> bool {
+        true
+    }
+
     fn reconstruct(&self, frame: &Frame, context: &Context) -> Result<Solution> {
         (context.progress)("clean", 0.0);
         let inputs = Inputs::new(frame, 1 << (self.levels - 1))?;

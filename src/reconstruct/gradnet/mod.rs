@@ -95,6 +95,10 @@ impl Reconstruction for Solver {
         true
     }
 
+    fn needs_cross(&self) -> bool {
+        true
+    }
+
     fn reconstruct(&self, frame: &Frame, context: &Context) -> Result<Solution> {
         check_memory(frame, context, METHOD.id, BYTES)?;
         let inputs = Inputs::new(frame, GradNet::MULTIPLE)?;

@@ -102,6 +102,10 @@ impl Reconstruction for Auto {
         true
     }
 
+    fn needs_cross(&self) -> bool {
+        true
+    }
+
     fn guide(&self) -> Option<&dyn Reconstruction> {
         self.safe.guide()
     }
@@ -129,6 +133,10 @@ impl Reconstruction for Net {
     }
 
     fn estimates_error(&self) -> bool {
+        true
+    }
+
+    fn needs_cross(&self) -> bool {
         true
     }
 

@@ -7,6 +7,7 @@ mod replay;
 use serde::{Deserialize, Serialize};
 
 use super::camera::CameraSamples;
+use super::half_edges::HalfEdges;
 use super::record::PathRecord;
 use super::tracer::PathTracer;
 
@@ -15,9 +16,15 @@ pub trait ShiftMapping: Send {
     /// Whether the vertices of base paths have to be recorded.
     fn needs_vertices(&self) -> bool;
 
-    /// Shifts the recorded base paths of a wave and adds this end's share of every edge to their samples' differences,
-    /// which are zero before, and stay so across the film's border.
-    fn shift(&mut self, tracer: &mut PathTracer, camera: &CameraSamples, record: &mut PathRecord);
+    /// Shifts the recorded base paths of a wave across their half-edges and adds this end's share of every edge to the
+    /// differences, which are zero before, and stay so across the film's border.
+    fn shift(
+        &mut self,
+        tracer: &mut PathTracer,
+        camera: &CameraSamples,
+        record: &mut PathRecord,
+        edges: &mut HalfEdges,
+    );
 }
 
 /// A row of the table of shift mappings.
@@ -26,6 +33,8 @@ pub struct ShiftKind {
     pub id: &'static str,
     /// Description for help texts.
     pub summary: &'static str,
+    /// Whether one end of an edge tells all of it: shifted paths cover all paths of the other end.
+    one_sided: bool,
     /// Builds it, from the roughness threshold and whether the ambient light's differences are recorded, too.
     make: fn(f32, bool) -> Box<dyn ShiftMapping>,
 }
@@ -61,6 +70,11 @@ impl Shift {
     /// Name in `--shift`.
     pub fn id(self) -> &'static str {
         SHIFTS[self.kind].id
+    }
+
+    /// Whether one end of an edge tells all of it, so that edges may be sampled from there alone.
+    pub fn is_one_sided(self) -> bool {
+        SHIFTS[self.kind].one_sided
     }
 
     /// Builds the mapping. `ambient`: record differences of the ambient light, too.

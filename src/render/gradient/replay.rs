@@ -1,11 +1,10 @@
 //! Random replay: the neighbour's path of the same random numbers, camera and lens included. It maps the cube of random
-//! numbers to itself, so that the Jacobian is one and either end of an edge counts half. It never fails, and is noisier and
-//! slower than reconnection.
+//! numbers to itself, so that the Jacobian is one and either end of an edge counts half. It never fails, so that one end
+//! tells all of an edge, and is noisier and slower than reconnection.
 
 use super::{ShiftKind, ShiftMapping};
-use crate::film::CROSS;
-use crate::math::vec2;
 use crate::render::camera::CameraSamples;
+use crate::render::half_edges::HalfEdges;
 use crate::render::record::PathRecord;
 use crate::render::tracer::PathTracer;
 
@@ -13,6 +12,7 @@ use crate::render::tracer::PathTracer;
 pub const SHIFT: ShiftKind = ShiftKind {
     id: "replay",
     summary: "trace the neighbour's path of the same random numbers; noisier, slower, never fails",
+    one_sided: true,
     make: |_, _| Box::new(Replay::default()),
 };
 
@@ -26,16 +26,26 @@ impl ShiftMapping for Replay {
         false
     }
 
-    fn shift(&mut self, tracer: &mut PathTracer, camera: &CameraSamples, record: &mut PathRecord) {
-        for (direction, step) in CROSS.into_iter().enumerate() {
-            tracer.trace(camera, vec2(step.0 as f32, step.1 as f32), false, &mut self.neighbours);
+    fn shift(
+        &mut self,
+        tracer: &mut PathTracer,
+        camera: &CameraSamples,
+        record: &mut PathRecord,
+        edges: &mut HalfEdges,
+    ) {
+        for slot in 0..edges.most() {
+            // Paths that have so many half-edges, packed anew, and the steps across them.
+            let shifted = (0..camera.pixels.len()).filter_map(|path| Some((path, edges.step(path, slot)?)));
+            let (paths, steps): (Vec<_>, Vec<_>) = shifted.unzip();
+            let pixels: Vec<_> = paths.iter().map(|&path| camera.pixels[path]).collect();
+            let beside = CameraSamples { pixels: &pixels, ..*camera };
+            tracer.trace_beside(&beside, &steps, &mut self.neighbours);
             record.work.offsets += self.neighbours.work.paths;
-            let samples = record.samples.iter_mut().zip(&self.neighbours.samples).zip(camera.pixels);
-            for ((sample, neighbour), &pixel) in samples {
-                let Some(differences) = &mut sample.differences else { continue };
-                if camera.neighbour(pixel, step).is_some() {
-                    differences.color[direction] = 0.5 * (neighbour.color - sample.color);
-                    differences.ambient[direction] = 0.5 * (neighbour.ambient - sample.ambient);
+            for ((&path, &step), neighbour) in paths.iter().zip(&steps).zip(&self.neighbours.samples) {
+                if camera.neighbour(camera.pixels[path], step).is_some() {
+                    let sample = &record.samples[path];
+                    let color = 0.5 * (neighbour.color - sample.color);
+                    edges.add(path, slot, (color, 0.5 * (neighbour.ambient - sample.ambient)));
                 }
             }
         }

@@ -25,7 +25,7 @@ pub use self::loader::Loader;
 pub use self::mesh::MeshData;
 use self::props::Object;
 use super::sensor::{self, Crop, Sensor, SensorInfo};
-use super::{Scene, SceneDescription, texture};
+use super::{Integrator, Scene, SceneDescription, texture};
 use crate::error::{Error, Result, SourceLoc};
 use crate::math::rng;
 
@@ -42,6 +42,8 @@ pub struct Options {
     pub size: Option<(usize, usize)>,
     /// Part of the film to render in place of the file's.
     pub crop: Option<Crop>,
+    /// Longest paths in edges in place of the file's; `u32::MAX`: no bound.
+    pub max_depth: Option<u32>,
     /// Whether the loader's warnings are errors.
     pub strict: bool,
     /// Threads for building (0: all).
@@ -58,6 +60,7 @@ impl Default for Options {
             sensor_optional: false,
             size: None,
             crop: None,
+            max_depth: None,
             strict: false,
             threads: 0,
             texture_memory: 4 << 30,
@@ -124,7 +127,8 @@ fn build(path: &Path, tree: xml::Tree, options: &Options) -> Result<Scene> {
     };
     let sensors = sensors.into_iter().map(|object| SensorInfo::new(object)).collect();
     let Contents { shapes, groups, emitters } = contents;
-    let integrator = integrator::choose(&integrators, &mut loader)?;
+    let chosen = integrator::choose(&integrators, &mut loader)?;
+    let integrator = Integrator { max_depth: options.max_depth.unwrap_or(chosen.max_depth), ..chosen };
     let groups = groups.into_values();
     let grouped = groups.iter().flat_map(|group| &group.shapes);
     let (attributes, files, warnings) = loader.finish();
@@ -168,7 +172,8 @@ fn fingerprint(tree: &xml::Tree, options: &Options) -> u64 {
     given.sort();
     let definitions = given.iter().flat_map(|(name, value)| [name, value]);
     let crop = options.crop.map(|crop| crop.to_string());
-    let texts = tree.sources.iter().chain(definitions).chain(&options.sensor).chain(&crop);
+    let depth = options.max_depth.map(|depth| format!("max_depth {depth}"));
+    let texts = tree.sources.iter().chain(definitions).chain(&options.sensor).chain(&crop).chain(&depth);
     texts.flat_map(|text| text.bytes()).fold(0, |hash, byte| rng::combine(hash, u64::from(byte)))
 }
 

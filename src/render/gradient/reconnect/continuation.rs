@@ -11,20 +11,20 @@ use crate::scene::bsdf::Lobe;
 use crate::scene::closure::Evals;
 
 impl OffsetSegment<'_> {
-    /// Sets the states of the offsets at the next vertices, in one direction.
+    /// Sets the states of the offsets at the next vertices, across a half-edge of each path.
     #[inline(always)]
     pub fn continue_offsets(
         &self,
         context: &ShiftContext,
         next: &NextVertices,
-        (states, direction): (&mut LevelStates, usize),
+        (states, slot): (&mut LevelStates, usize),
         offsets: &mut OffsetSurfaces,
     ) {
         let leaving = self.leaving & next.exists;
         let (prefix, carried) = self.extended_prefix(self.base_scatter);
         let carried = carried & !self.states.are(Kind::Failed);
         for lane in (leaving & !self.unconnected).lanes() {
-            let (states, to) = states.at(self.vertices.next.0[lane], direction);
+            let (states, to) = states.at(self.vertices.next.0[lane], slot);
             match carried.get(lane) {
                 true => states.set_connected(to, prefix.get(lane)),
                 false => states.fail(to),
@@ -39,14 +39,14 @@ impl OffsetSegment<'_> {
         let (prefix, carried) = self.extended_prefix(Evals { value: found.value, pdf: found.pdf });
         let connected = carried & found.possible;
         for lane in (unconnected & self.connectable).lanes() {
-            let (states, to) = states.at(self.vertices.next.0[lane], direction);
+            let (states, to) = states.at(self.vertices.next.0[lane], slot);
             match connected.get(lane) {
                 true => states.set_just_connected(to, prefix.get(lane), found.wi.get(lane)),
                 false => states.fail(to),
             }
         }
-        self.continue_extended(next, (states, direction), (context, offsets));
-        self.continue_unconnected(context, next, (states, direction), offsets);
+        self.continue_extended(next, (states, slot), (context, offsets));
+        self.continue_unconnected(context, next, (states, slot), offsets);
     }
 
     /// Prefixes behind the segments, over which the offsets scatter as given, and the lanes that carry light on.
@@ -61,13 +61,13 @@ impl OffsetSegment<'_> {
     fn continue_extended(
         &self,
         next: &NextVertices,
-        (states, direction): (&mut LevelStates, usize),
+        (states, slot): (&mut LevelStates, usize),
         (context, offsets): (&ShiftContext, &mut OffsetSurfaces),
     ) {
         for (lane, extension) in self.extensions.iter().filter(|(lane, _)| next.exists.get(*lane)) {
             let kept = extension.as_ref().and_then(|extension| self.own_vertex(*lane, extension));
             let kept = kept.map(|(prefix, hit)| (prefix, offsets.push(context.scene, context.base.len(), &hit)));
-            let (states, to) = states.at(self.vertices.next.0[*lane], direction);
+            let (states, to) = states.at(self.vertices.next.0[*lane], slot);
             match kept {
                 Some((prefix, vertex_index)) => states.set_unconnected(to, prefix, vertex_index),
                 None => states.fail(to),
@@ -81,7 +81,7 @@ impl OffsetSegment<'_> {
         &self,
         context: &ShiftContext,
         next: &NextVertices,
-        (states, direction): (&mut LevelStates, usize),
+        (states, slot): (&mut LevelStates, usize),
         offsets: &mut OffsetSurfaces,
     ) {
         let light = next.lit & !next.connects_light;
@@ -106,11 +106,11 @@ impl OffsetSegment<'_> {
                 _ => states.fail(to),
             };
             if light.get(lane) {
-                set(states.at(next_vertex, direction), Lobe::Smooth);
+                set(states.at(next_vertex, slot), Lobe::Smooth);
             }
             if scatter.get(lane) {
                 let there = &context.below[next_vertex as usize / LANES].scatters;
-                set(states.at_for_scatter(next_vertex, direction), there.get(next_vertex as usize % LANES).lobe);
+                set(states.at_for_scatter(next_vertex, slot), there.get(next_vertex as usize % LANES).lobe);
             }
         }
     }

@@ -22,10 +22,10 @@ use self::offsets::{MISS, OUT_OF_FILM, OffsetSurfaces};
 use self::segment::{NextVertices, OffsetSegment, Scratch, ShiftContext};
 use self::states::{Kind, LevelStates, Prefix, States};
 use super::{ShiftKind, ShiftMapping};
-use crate::film::CROSS;
 use crate::math::Rgb;
 use crate::math::lanes::{LANES, Lanes3, Mask};
 use crate::render::camera::CameraSamples;
+use crate::render::half_edges::HalfEdges;
 use crate::render::record::PathRecord;
 use crate::render::tracer::PathTracer;
 use crate::render::vertices::Vertices;
@@ -34,6 +34,7 @@ use crate::render::vertices::Vertices;
 pub const SHIFT: ShiftKind = ShiftKind {
     id: "reconnect",
     summary: "join the base path where it scatters diffusely",
+    one_sided: false,
     make: |threshold, ambient| Box::new(Reconnect { threshold, ambient, ..Reconnect::default() }),
 };
 
@@ -67,18 +68,24 @@ impl ShiftMapping for Reconnect {
         true
     }
 
-    fn shift(&mut self, tracer: &mut PathTracer, camera: &CameraSamples, record: &mut PathRecord) {
+    fn shift(
+        &mut self,
+        tracer: &mut PathTracer,
+        camera: &CameraSamples,
+        record: &mut PathRecord,
+        edges: &mut HalfEdges,
+    ) {
         let packets = camera.pixels.len().div_ceil(LANES);
         if self.ambient {
             // The ambient light reaches every vertex.
             record.lit_length.fill(u32::MAX);
         }
-        self.offsets.start(tracer.scene, camera, &record.levels[0][..packets]);
-        self.start(packets, &record.lit_length);
-        let PathRecord { levels, packets: counts, samples, lit_length, .. } = record;
+        self.offsets.start(tracer.scene, camera, edges, &record.levels[0][..packets]);
+        self.start(packets, &record.lit_length, edges);
+        let PathRecord { levels, packets: counts, lit_length, .. } = record;
         for (depth, &count) in counts.iter().enumerate() {
             let below = counts.get(depth + 1).map_or(&[][..], |&packets| &levels[depth + 1][..packets]);
-            self.next.reset(below.len());
+            self.next.reset(below.len(), edges.most());
             let context = ShiftContext {
                 scene: tracer.scene,
                 threshold: self.threshold,
@@ -87,11 +94,7 @@ impl ShiftMapping for Reconnect {
                 below,
             };
             for (packet, vertices) in levels[depth][..count].iter().enumerate() {
-                self.shift_packet(&context, (depth as u32, packet), vertices, lit_length, |id, direction, found| {
-                    let Some(differences) = &mut samples[id].differences else { return };
-                    differences.color[direction] += found.0;
-                    differences.ambient[direction] += found.1;
-                });
+                self.shift_packet(&context, (depth as u32, packet), vertices, lit_length, edges);
             }
             std::mem::swap(&mut self.states, &mut self.next);
         }
@@ -103,13 +106,13 @@ impl ShiftMapping for Reconnect {
 
 impl Reconnect {
     /// Starts the offsets of all paths that receive light: unconnected, where the camera sees a surface.
-    fn start(&mut self, packets: usize, lit_length: &[u32]) {
-        self.states.reset(packets);
+    fn start(&mut self, packets: usize, lit_length: &[u32], edges: &HalfEdges) {
+        self.states.reset(packets, edges.most());
         let start = Prefix { throughput: Rgb::ONE, ratio: 1.0 };
         for (sample, _) in lit_length.iter().enumerate().filter(|(_, length)| **length > 0) {
-            for direction in 0..CROSS.len() {
-                let vertex_index = self.offsets.first(sample, direction);
-                let (states, lane) = self.states.at(sample as u32, direction);
+            for slot in 0..edges.degree(sample) {
+                let vertex_index = self.offsets.first(sample, slot);
+                let (states, lane) = self.states.at(sample as u32, slot);
                 match vertex_index {
                     OUT_OF_FILM => {}
                     MISS => states.fail(lane),
@@ -119,15 +122,14 @@ impl Reconnect {
         }
     }
 
-    /// Shifts the segments that leave sixteen vertices, over all edges; `add` takes the sample, the direction, and the shares
-    /// of the differences of the scene's and of the ambient light.
+    /// Shifts the segments that leave sixteen vertices across all half-edges of their paths, number by number.
     fn shift_packet(
         &mut self,
         context: &ShiftContext,
         (depth, packet): (u32, usize),
         vertices: &Vertices,
         lit_length: &[u32],
-        mut add: impl FnMut(usize, usize, (Rgb, Rgb)),
+        edges: &mut HalfEdges,
     ) {
         // The part of a path behind its last lit vertex contributes nothing: the other ends of the edges account for
         // whatever shifted copies of it would receive.
@@ -137,29 +139,31 @@ impl Reconnect {
         if !reached.any() {
             return;
         }
-        let unconnected = self.states.unconnected(packet);
+        let slots = reached.lanes().map(|lane| edges.degree(vertices.id.0[lane] as usize)).max().unwrap_or(0);
+        let unconnected = self.states.unconnected(packet, slots);
         let next = NextVertices::new(context, vertices, reached, unconnected, |id| reaches(id, depth + 1));
-        for direction in 0..CROSS.len() {
-            let (for_light, for_scatter) = self.states.get(packet, direction);
+        for slot in 0..slots {
+            let (for_light, for_scatter) = self.states.get(packet, slot);
             let inside = reached & for_light.inside();
-            let step = Step { context, vertices, next: &next, active: reached, direction };
+            let step = Step { context, vertices, next: &next, active: reached, slot };
             let to = (&mut self.next, &mut self.offsets);
             let found = shift_segment(&step, &mut self.scratch, (for_light, for_scatter), to);
             for lane in inside.lanes() {
                 let ambient = if self.ambient { found.ambient.get(lane) } else { Rgb::ZERO };
-                add(vertices.id.0[lane] as usize, direction, (found.color.get(lane), ambient));
+                edges.add(vertices.id.0[lane] as usize, slot, (found.color.get(lane), ambient));
             }
         }
     }
 }
 
-/// The offsets of sixteen base paths in one direction, on the way from one vertex to the next.
+/// The offsets of sixteen base paths across a half-edge of each, on the way from one vertex to the next.
 struct Step<'a> {
     context: &'a ShiftContext<'a>,
     vertices: &'a Vertices,
     next: &'a NextVertices,
     active: Mask,
-    direction: usize,
+    /// Number of the half-edge among those of each path.
+    slot: usize,
 }
 
 /// Returns the differences of the light sampled at the vertices and of the emitters hit next, and sets the states of the
@@ -174,7 +178,7 @@ fn shift_segment(
     (for_light, for_scatter): (&States, &States),
     (next_states, offsets): (&mut LevelStates, &mut OffsetSurfaces),
 ) -> SegmentDifferences {
-    let Step { context, vertices, next, active, direction } = *step;
+    let Step { context, vertices, next, active, slot } = *step;
     scratch.load_offsets(context, offsets, (for_light, for_scatter), active);
     let lit = active & vertices.lit & for_light.inside();
     scratch.connected += (lit & for_light.are(Kind::Unconnected)).count();
@@ -187,6 +191,6 @@ fn shift_segment(
     }
     let segment = OffsetSegment::new(context, vertices, scratch, for_scatter, leaving);
     let hit = segment.emission_differences(context);
-    segment.continue_offsets(context, next, (next_states, direction), offsets);
+    segment.continue_offsets(context, next, (next_states, slot), offsets);
     SegmentDifferences { color: sampled + hit.color, ambient: hit.ambient }
 }

@@ -1,10 +1,9 @@
 //! Surfaces of offset paths: their camera hits, most of which are those of neighbouring base paths, and the hits of
 //! unconnected offsets.
 
-use crate::film::CROSS;
 use crate::math::lanes::{LANES, Mask};
-use crate::math::{Vec2, vec2};
 use crate::render::camera::CameraSamples;
+use crate::render::half_edges::HalfEdges;
 use crate::render::vertices::Vertices;
 use crate::scene::packet::{Materials, Rays, Surfaces};
 use crate::scene::{Scene, Surface};
@@ -31,8 +30,10 @@ pub struct OffsetSurfaces {
     hits: Vec<Mask>,
     /// Lanes of `traced` that are in use, including those of packets that are not full.
     lanes_used: usize,
-    /// Vertex indices of the camera hits, by sample and direction.
-    first: Vec<[u32; 4]>,
+    /// Vertex indices of the camera hits, by sample and number of the half-edge.
+    first: Vec<u32>,
+    /// Half-edges that there is room for at every sample.
+    slots: usize,
     /// Vertex indices of the pixels in a window around the wave's, row by row.
     window: Vec<u32>,
     /// Pixels of the window that the wave has no sample of.
@@ -41,19 +42,21 @@ pub struct OffsetSurfaces {
 
 impl OffsetSurfaces {
     /// Finds the camera hits of all offsets of a wave; `level` holds those of the base paths.
-    pub fn start(&mut self, scene: &Scene, camera: &CameraSamples, level: &[Vertices]) {
+    pub fn start(&mut self, scene: &Scene, camera: &CameraSamples, edges: &HalfEdges, level: &[Vertices]) {
         self.lanes_used = 0;
+        self.slots = edges.most();
         self.first.clear();
+        self.first.resize(camera.pixels.len() * self.slots, OUT_OF_FILM);
         if scene.sensor().has_lens() {
-            self.trace_all(scene, camera);
+            self.trace_all(scene, camera, edges);
         } else {
-            self.reuse_camera_hits(scene, camera, level);
+            self.reuse_camera_hits(scene, camera, edges, level);
         }
     }
 
     /// Vertex index of an offset's camera hit, [`MISS`] or [`OUT_OF_FILM`].
-    pub fn first(&self, sample: usize, direction: usize) -> u32 {
-        self.first[sample][direction]
+    pub fn first(&self, sample: usize, slot: usize) -> u32 {
+        self.first[sample * self.slots + slot]
     }
 
     /// Keeps the hit of an unconnected offset and returns its vertex index; `base` is the number of packets of camera hits.
@@ -93,14 +96,15 @@ impl OffsetSurfaces {
 
     /// With a pinhole the camera ray of an offset is that of the neighbour's base path: only those of the pixels around the
     /// wave's are traced.
-    fn reuse_camera_hits(&mut self, scene: &Scene, camera: &CameraSamples, level: &[Vertices]) {
+    fn reuse_camera_hits(&mut self, scene: &Scene, camera: &CameraSamples, edges: &HalfEdges, level: &[Vertices]) {
         let least = |of: fn(&(usize, usize)) -> usize| camera.pixels.iter().map(of).min().unwrap_or(0);
         let most = |of: fn(&(usize, usize)) -> usize| camera.pixels.iter().map(of).max().unwrap_or(0);
         let (left, top) = (least(|p| p.0), least(|p| p.1));
-        // The window starts one pixel before them, which may be outside the film.
-        let columns = most(|p| p.0) - left + 3;
-        let rows = most(|p| p.1) - top + 3;
-        let cell = |x: usize, y: usize| (y + 1 - top) * columns + x + 1 - left;
+        // The window starts before them, maybe outside the film.
+        let rim = edges.reach();
+        let columns = most(|p| p.0) - left + 1 + 2 * rim;
+        let rows = most(|p| p.1) - top + 1 + 2 * rim;
+        let cell = |x: usize, y: usize| (y + rim - top) * columns + x + rim - left;
         self.window.clear();
         self.window.resize(columns * rows, MISS);
         for (number, &(x, y)) in camera.pixels.iter().enumerate() {
@@ -108,27 +112,26 @@ impl OffsetSurfaces {
         }
         self.rim_pixels.clear();
         let first_traced = (level.len() * LANES) as u32;
-        for &(x, y) in camera.pixels {
-            let mut indices = [OUT_OF_FILM; 4];
-            for (index, step) in indices.iter_mut().zip(CROSS) {
-                let Some(there) = camera.neighbour((x, y), step) else { continue };
+        for (sample, &pixel) in camera.pixels.iter().enumerate() {
+            for slot in 0..edges.degree(sample) {
+                let step = edges.step(sample, slot);
+                let Some(there) = step.and_then(|step| camera.neighbour(pixel, step)) else { continue };
                 let number = &mut self.window[cell(there.0, there.1)];
                 if *number == MISS {
                     *number = first_traced + self.rim_pixels.len() as u32;
                     self.rim_pixels.push(there);
                 }
-                *index = *number;
+                self.first[sample * self.slots + slot] = *number;
             }
-            self.first.push(indices);
         }
         let rim_pixels = std::mem::take(&mut self.rim_pixels);
         let camera = CameraSamples { pixels: &rim_pixels, ..*camera };
         for first in (0..rim_pixels.len()).step_by(LANES) {
-            let rays = camera.rays(scene, first, camera.hashes(first), Vec2::ZERO);
+            let rays = camera.rays(scene, first, camera.hashes(first), &[]);
             self.intersect(scene, &rays, LANES.min(rim_pixels.len() - first));
         }
         self.rim_pixels = rim_pixels;
-        for index in self.first.iter_mut().flatten().filter(|index| **index < OUT_OF_FILM) {
+        for index in self.first.iter_mut().filter(|index| **index < OUT_OF_FILM) {
             let (packet, lane) = (*index as usize / LANES, *index as usize % LANES);
             let hit = level.get(packet).map_or_else(|| self.hits[packet - level.len()], |vertices| vertices.hit);
             if !hit.get(lane) {
@@ -138,20 +141,21 @@ impl OffsetSurfaces {
     }
 
     /// Behind a lens every pixel has its own ray origin, so offsets need camera rays of their own.
-    fn trace_all(&mut self, scene: &Scene, camera: &CameraSamples) {
+    fn trace_all(&mut self, scene: &Scene, camera: &CameraSamples, edges: &HalfEdges) {
         let base = camera.pixels.len().div_ceil(LANES);
-        self.first.resize(camera.pixels.len(), [OUT_OF_FILM; 4]);
         for first in (0..camera.pixels.len()).step_by(LANES) {
             let hashes = camera.hashes(first);
             let count = LANES.min(camera.pixels.len() - first);
-            for (direction, step) in CROSS.into_iter().enumerate() {
-                let rays = camera.rays(scene, first, hashes, vec2(step.0 as f32, step.1 as f32));
+            for slot in 0..self.slots {
+                let step = |lane: usize| edges.step(first + lane, slot);
+                let steps: Vec<_> = (0..count).map(|lane| step(lane).unwrap_or_default()).collect();
+                let rays = camera.rays(scene, first, hashes, &steps);
                 let packet = base + self.lanes_used / LANES;
                 let hit = self.intersect(scene, &rays, count);
                 for (lane, &pixel) in camera.pixels[first..].iter().take(count).enumerate() {
                     let index = if hit.get(lane) { (packet * LANES + lane) as u32 } else { MISS };
-                    let inside = camera.neighbour(pixel, step).is_some();
-                    self.first[first + lane][direction] = if inside { index } else { OUT_OF_FILM };
+                    let inside = step(lane).is_some_and(|step| camera.neighbour(pixel, step).is_some());
+                    self.first[(first + lane) * self.slots + slot] = if inside { index } else { OUT_OF_FILM };
                 }
             }
         }

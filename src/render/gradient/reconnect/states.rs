@@ -135,58 +135,64 @@ impl States {
     }
 }
 
-/// States at the vertices of one depth, over four edges. At a vertex an offset may be in different states for its light
+/// States at the vertices of one depth, over the half-edges of their paths. At a vertex an offset may be in different states for its light
 /// and for its continuation: a material with a diffuse and a specular lobe is connected to for the one and not for the
 /// other.
 #[derive(Default)]
 pub struct LevelStates {
     /// States for the light sampled at the vertices.
-    for_light: Vec<[States; 4]>,
+    for_light: Vec<States>,
     /// States for the continuation, where they differ.
-    for_scatter: Vec<[States; 4]>,
+    for_scatter: Vec<States>,
     /// Lanes where they differ.
-    differs: Vec<[Mask; 4]>,
+    differs: Vec<Mask>,
+    /// Half-edges that there is room for at every vertex.
+    slots: usize,
 }
 
 impl LevelStates {
-    /// States of the given number of packets, all of them out of the film.
-    pub fn reset(&mut self, packets: usize) {
-        self.for_light.resize_with(packets.max(self.for_light.len()), Default::default);
-        self.for_scatter.resize_with(packets.max(self.for_scatter.len()), Default::default);
+    /// States of the given number of packets, with room for so many half-edges of each path, all of them out of the film.
+    pub fn reset(&mut self, packets: usize, slots: usize) {
+        self.slots = slots;
+        let count = packets * slots;
+        self.for_light.resize_with(count.max(self.for_light.len()), Default::default);
+        self.for_scatter.resize_with(count.max(self.for_scatter.len()), Default::default);
         self.differs.clear();
-        self.differs.resize(packets, [Mask::NONE; 4]);
-        self.for_light[..packets].iter_mut().flatten().for_each(|states| states.kind = Bits::ZERO);
+        self.differs.resize(count, Mask::NONE);
+        self.for_light[..count].iter_mut().for_each(|states| states.kind = Bits::ZERO);
     }
 
-    /// States of a packet in a direction: for light and for the continuation.
-    pub fn get(&mut self, packet: usize, direction: usize) -> (&States, &States) {
-        let (states, differs) = (&self.for_light[packet][direction], self.differs[packet][direction]);
+    /// States of a packet across half-edges of one number: for light and for the continuation.
+    pub fn get(&mut self, packet: usize, slot: usize) -> (&States, &States) {
+        let at = packet * self.slots + slot;
+        let (states, differs) = (&self.for_light[at], self.differs[at]);
         if !differs.any() {
             return (states, states);
         }
-        let for_scatter = &mut self.for_scatter[packet][direction];
+        let for_scatter = &mut self.for_scatter[at];
         for lane in (!differs).lanes() {
             for_scatter.copy(lane, states);
         }
         (states, for_scatter)
     }
 
-    /// Lanes of a packet with an offset, in any direction, that continues from a vertex of its own.
-    pub fn unconnected(&mut self, packet: usize) -> Mask {
-        (0..4).fold(Mask::NONE, |all, direction| all | self.get(packet, direction).1.are(Kind::Unconnected))
+    /// Lanes of a packet with an offset, across any of the first half-edges, that continues from a vertex of its own.
+    pub fn unconnected(&mut self, packet: usize, slots: usize) -> Mask {
+        (0..slots).fold(Mask::NONE, |all, slot| all | self.get(packet, slot).1.are(Kind::Unconnected))
     }
 
     /// The state at a vertex for light and, where it does not differ, for the continuation.
     #[inline(always)]
-    pub fn at(&mut self, vertex_index: u32, direction: usize) -> (&mut States, usize) {
+    pub fn at(&mut self, vertex_index: u32, slot: usize) -> (&mut States, usize) {
         let (packet, lane) = (vertex_index as usize / LANES, vertex_index as usize % LANES);
-        (&mut self.for_light[packet][direction], lane)
+        (&mut self.for_light[packet * self.slots + slot], lane)
     }
 
     /// The state at a vertex for a continuation that differs.
-    pub fn at_for_scatter(&mut self, vertex_index: u32, direction: usize) -> (&mut States, usize) {
+    pub fn at_for_scatter(&mut self, vertex_index: u32, slot: usize) -> (&mut States, usize) {
         let (packet, lane) = (vertex_index as usize / LANES, vertex_index as usize % LANES);
-        self.differs[packet][direction].set(lane, true);
-        (&mut self.for_scatter[packet][direction], lane)
+        let at = packet * self.slots + slot;
+        self.differs[at].set(lane, true);
+        (&mut self.for_scatter[at], lane)
     }
 }

@@ -1,0 +1,54 @@
+//! Common part of the commands that sample differences: the neighbours that paths are shifted to.
+
+use anyhow::Result;
+use fluxion::error::Error;
+use fluxion::film::Needs;
+use fluxion::neighbours::{PILOT, Selector};
+use fluxion::reconstruct::{self, METHODS, Method, Reconstruction};
+
+use super::terminal::note;
+
+/// Options of the neighbours.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Neighbours that paths are shifted to; `fluxion info --kernels` lists them
+    #[arg(long, default_value = "cross", hide_short_help = true, value_name = "NAME[:KEY=VALUE,...]")]
+    kernel: String,
+    /// Samples without differences that neighbours are chosen by, for kernels that look at the picture
+    #[arg(long, default_value_t = PILOT, hide_short_help = true, value_name = "SPP", value_parser = clap::value_parser!(u32).range(1..))]
+    pilot: u32,
+}
+
+impl Args {
+    /// The neighbours for a method and for films of so many samples, if that is known. The error says which methods take them.
+    pub fn make(&self, method: &dyn Reconstruction, spp: Option<u32>) -> Result<Selector> {
+        let selector = Selector::parse(&self.kernel, self.pilot)?;
+        if selector.is_cross() {
+            return Ok(selector);
+        }
+        if method.needs_cross() {
+            let takes = |method: &&Method| {
+                reconstruct::parse(method.id).is_ok_and(|made| made.needs().edges.is_sampled() && !made.needs_cross())
+            };
+            let names: Vec<_> = METHODS.iter().filter(takes).map(|method| method.id).collect();
+            let what = "this method takes differences to the four direct neighbours only; with other kernels take";
+            return Err(Error::Usage(format!("{what} --method {}", names.join(", "))).into());
+        }
+        if !method.needs().edges.is_sampled() {
+            note!("warning: this method takes no differences: --kernel changes nothing");
+            return Ok(Selector::default());
+        }
+        if let Some(spp) = spp.filter(|&spp| spp <= selector.pilot()) {
+            let pilot = selector.pilot();
+            let what =
+                format!("a pilot of {pilot} samples leaves none of {spp} for differences: give a smaller --pilot");
+            return Err(Error::Usage(what).into());
+        }
+        Ok(selector)
+    }
+}
+
+/// Statistics that have to be recorded for a method and for the choice of its neighbours.
+pub fn needs(method: Needs, selector: &Selector) -> Needs {
+    method.union(selector.needs())
+}

@@ -1,0 +1,21 @@
+//! Neighbours at random, for tests.
+
+use super::KernelKind;
+use crate::film::STEPS;
+use crate::math::rng;
+
+/// `random`.
+pub const KERNEL: KernelKind = KernelKind {
+    id: "random",
+    summary: "k pixels of a window of 5x5 at random, for tests",
+    k: 4,
+    pilot: None,
+    select: |frame, selector| (0..frame.width * frame.height).map(|pixel| choose(pixel as u64, selector.k)).collect(),
+};
+
+/// The steps with the smallest random keys.
+fn choose(pixel: u64, k: u32) -> u32 {
+    let mut keys: Vec<_> = (0..STEPS.len()).map(|step| (rng::combine(rng::mix(pixel), step as u64), step)).collect();
+    keys.sort_unstable();
+    keys.iter().take(k as usize).fold(0, |mask, (_, step)| mask | 1 << step)
+}
