@@ -125,7 +125,7 @@ fn load_at(path: &Path, size: Option<(usize, usize)>) -> Scene {
 
 fn seconds(scene: &Scene, spp: u32, needs: Needs) -> f64 {
     let settings = RenderSettings { seed: 1, ..RenderSettings::new(Budget::Spp(spp), needs) };
-    let control = Control { stop: &AtomicBool::new(false), progress: &|_| (), sink: None };
+    let control = Control { stop: &AtomicBool::new(false), ..Control::QUIET };
     let elapsed: Duration = render(scene, settings, &control).elapsed;
     elapsed.as_secs_f64()
 }

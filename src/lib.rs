@@ -50,6 +50,7 @@ pub mod checkpoint;
 pub mod dataset;
 pub mod metrics;
 pub mod reference;
+pub mod samples;
 pub mod validate;
 
 pub mod stress;

@@ -1,6 +1,7 @@
 //! The plan: what a scene and a method need, and so what is left out. Decided once, before rendering, with the reasons.
 
 use crate::film::{EdgeNeed, Needs};
+use crate::neighbours::Selector;
 use crate::scene::Scene;
 
 /// A decision: something that may be computed, and the reason why it is or is not.
@@ -38,6 +39,19 @@ impl Plan {
         let mut items = of_film(scene, method, saved, needs);
         items.extend(of_scene(scene, needs));
         Self { needs, items }
+    }
+
+    /// Says by what neighbours are chosen, if they are.
+    #[must_use]
+    pub fn with_kernel(mut self, kernel: &Selector) -> Self {
+        if !kernel.is_cross() {
+            let reason = match kernel.pilot() {
+                0 => format!("the neighbours of {kernel} do not depend on the picture"),
+                spp => format!("{spp} samples without differences choose the neighbours of {kernel}"),
+            };
+            self.items.push(Item { name: "pilot", computed: kernel.pilot() > 0, reason });
+        }
+        self
     }
 
     /// Leaves nothing out, for comparison; to be used with [`Scene::disable_fast_paths`].

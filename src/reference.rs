@@ -73,7 +73,7 @@ impl Reference {
         let (mut halves, mut seconds) = (Vec::new(), 0.0);
         for (k, seed) in [self.seed, rng::combine(self.seed, 1)].into_iter().enumerate() {
             let progress = |share: f32| (control.progress)(0.5 * (k as f32 + share));
-            let control = Control { stop: control.stop, progress: &progress, sink: None };
+            let control = Control { stop: control.stop, progress: &progress, ..Control::QUIET };
             let (budget, first, needs) = (Budget::Spp(spp), self.spp / 2, Needs::default());
             let outcome = render(scene, RenderSettings { seed, first, ..RenderSettings::new(budget, needs) }, &control);
             if outcome.stopped {

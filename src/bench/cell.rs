@@ -109,7 +109,7 @@ impl<'a> Runner<'a> {
         stop: &AtomicBool,
         seconds: &mut Seconds,
     ) -> (render::RenderOutcome, Frame) {
-        let control = Control { stop, progress: &|_| {}, sink: None };
+        let control = Control { stop, ..Control::QUIET };
         let outcome = render(&self.case.scene, self.settings(budget, seed), &control);
         seconds.render = outcome.elapsed.as_secs_f64();
         let start = Instant::now();
@@ -170,7 +170,7 @@ impl<'a> Runner<'a> {
             limits,
             reconstruction: Some(Duration::from_secs_f64(spec.finish)),
         };
-        let control = Control { stop: spec.stop, progress: &|_| {}, sink: None };
+        let control = Control { stop: spec.stop, ..Control::QUIET };
         let outcome = adaptive::run(&self.case.scene, &settings, &control, &Context::QUIET)?;
         let AdaptiveOutcome { render, solution, develop, reconstruct, .. } = outcome;
         (seconds.render, seconds.develop, seconds.reconstruct) = (render.elapsed.as_secs_f64(), develop, reconstruct);

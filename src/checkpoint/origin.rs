@@ -148,7 +148,7 @@ impl Origin {
             seconds: format!("{:.3}", outcome.elapsed.as_secs_f64()),
             method: self.method.clone(),
             plan: self.plan.clone(),
-            kernel: Some(self.kernel).filter(|kernel| !kernel.is_cross()).map_or_else(String::new, |k| k.to_string()),
+            kernel: self.kernel.name(),
         }
     }
 }

@@ -51,6 +51,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     stats.seconds.load = start.elapsed().as_secs_f64();
     stats.spp = frame.provenance.spp.parse().unwrap_or(0);
     stats.plan.clone_from(&frame.provenance.plan);
+    stats.kernel.clone_from(&frame.provenance.kernel);
     let sum = |layer| frame.get(layer).map_or(0.0, |image| image.data.iter().map(|&n| f64::from(n)).sum());
     (stats.samples, stats.rejected) = (sum(Layer::Samples) as u64, sum(Layer::Rejected) as u64);
     let solution = args.method.solve(method.as_ref(), &frame, args.quiet, &mut stats)?;

@@ -41,6 +41,9 @@ pub struct Stats {
     pub method: String,
     /// Summary of the plan.
     pub plan: String,
+    /// Neighbours that paths were shifted to, if not the cross.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub kernel: String,
     /// Passes of adaptive sampling.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub passes: Vec<Pass>,

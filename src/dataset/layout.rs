@@ -4,11 +4,11 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::npy::{self, Number};
 use crate::error::Result;
 use crate::film::{Frame, Layer, Needs};
 use crate::image::Image;
 use crate::image::io::{Kind, Pixels, write};
+use crate::image::npy::{self, Number};
 use crate::reconstruct::Solution;
 
 /// Arrangement of the files.

@@ -8,7 +8,6 @@
 //! ```
 
 mod layout;
-mod npy;
 
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
@@ -17,10 +16,10 @@ use serde::{Deserialize, Serialize};
 
 pub use self::layout::Layout;
 use self::layout::{Snapshot, Target, file};
-pub use self::npy::Number;
 use crate::error::{Error, Result};
 use crate::files;
 use crate::film::Needs;
+pub use crate::image::npy::Number;
 use crate::math::rng;
 use crate::plan::Plan;
 use crate::reconstruct::{self, Context, Reconstruction};

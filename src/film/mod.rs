@@ -28,7 +28,7 @@ pub use self::layer::Layer;
 pub use self::needs::{EdgeNeed, Needs};
 pub use self::neighbours::{CROSS, Neighbours, STEPS, opposite};
 pub use self::provenance::Provenance;
-pub use self::sample::{Differences, Features, Rejected, Sample};
+pub use self::sample::{Differences, Features, Rejected, Sample, Scattering};
 pub use self::statistic::bin_count;
 pub use self::tile::Tile;
 
@@ -164,6 +164,7 @@ mod tests {
             depth: value,
             occlusion: 0.5 * value,
             position: Vec3::splat(value),
+            ..Features::default()
         };
         Sample { color: vec3(value, 2.0, 0.0), direct: Rgb::ONE, features, ambient: Rgb::splat(value), alpha: 1.0 }
     }

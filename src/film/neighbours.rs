@@ -100,6 +100,11 @@ impl Neighbours {
         self.masks[pixel].count_ones() as usize
     }
 
+    /// Most neighbours of a pixel.
+    pub fn most(&self) -> usize {
+        self.masks.iter().map(|mask| mask.count_ones()).max().unwrap_or(0) as usize
+    }
+
     /// Mean number of neighbours.
     pub fn mean_degree(&self) -> f64 {
         let total: u64 = self.masks.iter().map(|mask| u64::from(mask.count_ones())).sum();

@@ -16,6 +16,40 @@ pub struct Features {
     pub occlusion: f32,
     /// World position of the surface point.
     pub position: Vec3,
+    /// Least roughness of the material's smooth lobes: 0 without such, 1 for diffuse ones.
+    pub roughness: f32,
+    /// Kinds of scattering there and before.
+    pub scattering: Scattering,
+}
+
+/// A set of kinds of scattering.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Scattering(u8);
+
+impl Scattering {
+    /// Diffuse lobes.
+    pub const DIFFUSE: Self = Self(1);
+    /// Lobes about a direction.
+    pub const GLOSSY: Self = Self(2);
+    /// Mirrors and clear glass.
+    pub const SPECULAR: Self = Self(4);
+    /// The camera's path leaves its first surface on the side that it came from.
+    pub const REFLECTION: Self = Self(8);
+    /// The camera's path leaves it on the other side.
+    pub const TRANSMISSION: Self = Self(16);
+    /// The surface emits light.
+    pub const EMISSION: Self = Self(32);
+
+    /// Whether these kinds belong to the set.
+    pub fn has(self, kinds: Self) -> bool {
+        self.0 & kinds.0 == kinds.0
+    }
+
+    /// Adds kinds if a condition holds.
+    #[must_use]
+    pub fn with(self, kinds: Self, condition: bool) -> Self {
+        if condition { Self(self.0 | kinds.0) } else { self }
+    }
 }
 
 impl Features {

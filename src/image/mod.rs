@@ -3,6 +3,7 @@
 pub mod channels;
 pub mod io;
 pub mod nl_means;
+pub mod npy;
 pub mod oidn;
 pub mod planes;
 

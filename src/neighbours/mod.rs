@@ -86,6 +86,11 @@ impl Selector {
         self.kind == 0
     }
 
+    /// The kernel for headers: nothing for the cross.
+    pub fn name(&self) -> String {
+        if self.is_cross() { String::new() } else { self.to_string() }
+    }
+
     /// Samples that every pixel has before its neighbours are chosen; zero if they do not depend on any.
     pub fn pilot(&self) -> u32 {
         self.pilot

@@ -1,6 +1,6 @@
 //! Features of camera paths: albedo, normal, depth, position and ambient occlusion of the surface that a pixel shows.
 
-use crate::film::Features;
+use crate::film::{Features, Scattering};
 use crate::math::frame::Frame;
 use crate::math::{Rgb, Vec2, Vec3, warp};
 use crate::scene::bsdf::{BsdfSample, Lobe};
@@ -11,6 +11,8 @@ use crate::scene::{Ray, Scene};
 #[derive(Clone, Copy, Default)]
 pub struct FeatureWalk {
     found: bool,
+    /// Whether the first surface has been left.
+    left: bool,
     length: f32,
     tint: Option<Rgb>,
 }
@@ -38,9 +40,26 @@ impl FeatureWalk {
             let side = if surfaces.wi.z.0[lane] < 0.0 { -1.0 } else { 1.0 };
             let albedo = materials.albedo(scene, surfaces, lane) * tint;
             let (normal, depth) = (surfaces.frame.n.get(lane) * side, self.length);
-            *features = Features { albedo, normal, depth, position: p, ..*features };
+            let (lobes, seen_through) = (materials.roughness().0[lane], self.tint.is_some());
+            let scattering = features
+                .scattering
+                .with(Scattering::DIFFUSE, lobes == f32::INFINITY)
+                .with(Scattering::GLOSSY, smooth && lobes < f32::INFINITY)
+                .with(Scattering::SPECULAR, seen_through || !smooth)
+                .with(Scattering::EMISSION, surfaces.emissive.get(lane));
+            let roughness = lobes.clamp(0.0, 1.0);
+            *features = Features { albedo, normal, depth, position: p, roughness, scattering, ..*features };
         }
         self.found = smooth;
+    }
+
+    /// Leaves a surface; `same_side` of the first one as it was reached.
+    pub fn leave(&mut self, features: &mut Features, same_side: bool) {
+        if !self.left {
+            let kind = if same_side { Scattering::REFLECTION } else { Scattering::TRANSMISSION };
+            features.scattering = features.scattering.with(kind, true);
+        }
+        self.left = true;
     }
 
     /// Continues through a delta lobe.
@@ -70,5 +89,5 @@ pub fn occlusion(scene: &Scene, features: &Features, u: Vec2) -> f32 {
 pub fn far(scene: &Scene, Ray { origin, direction, .. }: Ray) -> Features {
     let (center, radius) = scene.bounds().sphere();
     let depth = origin.distance(center) + radius;
-    Features { depth, position: origin + direction * depth, occlusion: 1.0, ..Features::default() }
+    Features { depth, position: origin + direction * depth, occlusion: 1.0, roughness: 1.0, ..Features::default() }
 }

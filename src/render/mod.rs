@@ -30,8 +30,10 @@ use serde::{Deserialize, Serialize};
 pub use self::gradient::{SHIFTS, Shift};
 pub use self::sampler::Sampler;
 pub use self::schedule::{
-    Budget, CheckpointSink, Control, RenderOutcome, RenderSettings, render, render_to_counts, resume, sample,
+    Budget, CheckpointSink, Control, RenderOutcome, RenderSettings, SampleSink, WaveSamples, render, render_to_counts,
+    resume, sample,
 };
+pub use self::wave::Samples;
 
 /// One sample of one pixel, the same whenever and wherever it is asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]

@@ -133,6 +133,8 @@ impl PathRecord {
                 let throughput = vertices.throughput.get(lane) * vertices.scatters.weight.get(lane);
                 self.samples[id].ambient += throughput / vertices.survival.0[lane];
             }
+            let same_side = vertices.surfaces.wi.z.0[lane] * vertices.scatters.wo.z.0[lane] > 0.0;
+            self.walks[id].leave(&mut self.samples[id].features, same_side);
             if !self.walks[id].is_done() {
                 self.walks[id].pass(&vertices.scatters.get(lane));
             }

@@ -6,14 +6,14 @@ use std::time::{Duration, Instant};
 
 use rayon::prelude::*;
 
-use super::SampleId;
 use super::gradient::Shift;
 use super::per_tile::PerTile;
 use super::seen;
 use super::thinning::Shares;
-use super::wave::Wave;
+use super::wave::{Samples, Wave};
+use super::{SampleId, Sampler};
 use crate::film::{EdgeNeed, Film, Kernel, Needs, Rejected, Sample, TILE, Tile};
-use crate::math::Rgb;
+use crate::math::{Rgb, Vec2};
 use crate::neighbours::Selector;
 use crate::scene::Scene;
 
@@ -60,6 +60,24 @@ pub trait CheckpointSink: Sync {
     fn save(&self, outcome: &RenderOutcome);
 }
 
+/// One sample of each of some pixels.
+pub struct WaveSamples<'a> {
+    /// Number of the samples, from 0 on.
+    pub number: u32,
+    /// Position within the pixels, in [0, 1)².
+    pub film: Vec2,
+    /// The pixels, row by row.
+    pub pixels: &'a [(usize, usize)],
+    /// Their samples.
+    pub samples: &'a Samples<'a>,
+}
+
+/// Receives the samples of a render one by one.
+pub trait SampleSink: Sync {
+    /// Takes samples; called by all threads.
+    fn put(&self, wave: &WaveSamples);
+}
+
 /// Connections between the caller and a running render.
 #[derive(Clone, Copy)]
 pub struct Control<'a> {
@@ -69,6 +87,8 @@ pub struct Control<'a> {
     pub progress: &'a (dyn Fn(f32) + Sync),
     /// Receiver of checkpoints.
     pub sink: Option<&'a dyn CheckpointSink>,
+    /// Receiver of single samples.
+    pub samples: Option<&'a dyn SampleSink>,
 }
 
 /// The flag of renders that are never stopped; nobody sets it.
@@ -76,7 +96,7 @@ static NEVER: AtomicBool = AtomicBool::new(false);
 
 impl Control<'_> {
     /// Never stops, and reports to nobody.
-    pub const QUIET: Self = Self { stop: &NEVER, progress: &|_| {}, sink: None };
+    pub const QUIET: Self = Self { stop: &NEVER, progress: &|_| {}, sink: None, samples: None };
 }
 
 /// A rendered film with its statistics.
@@ -229,8 +249,7 @@ fn run_tiles(
             return;
         }
         let before = tile.samples();
-        if let Some(rejected) =
-            run_tile(settings, wave, (tile, number), (&outcome.choices, pending), (goals, control.stop))
+        if let Some(rejected) = run_tile(settings, wave, (tile, number), (&outcome.choices, pending), (goals, control))
         {
             let mut first = first_rejected.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
             first.get_or_insert(rejected);
@@ -258,7 +277,7 @@ fn run_tile(
     wave: &mut Wave,
     (tile, number): (&mut Tile, usize),
     (choices, pending): (&Choices, bool),
-    (goals, stop): (Goals, &AtomicBool),
+    (goals, control): (Goals, &Control),
 ) -> Option<(SampleId, Rejected)> {
     let mut first_rejected = None;
     // Samples of one number are traced together, whatever number a pixel starts with.
@@ -274,7 +293,7 @@ fn run_tile(
     let all_cells = choices.grids.get(number, || seen::grids(wave.scene(), &all));
     let (mut numbers, mut pixels, mut cells) = (Vec::new(), Vec::new(), Vec::new());
     for index in start..end {
-        if index - start >= SOON && stop.load(Ordering::Relaxed) {
+        if index - start >= SOON && control.stop.load(Ordering::Relaxed) {
             break;
         }
         numbers.clear();
@@ -292,6 +311,10 @@ fn run_tile(
         };
         let differences = !pending && (settings.needs.edges != EdgeNeed::Thinned || pays());
         let samples = wave.trace(id, &pixels, &cells, differences);
+        if let Some(sink) = control.samples {
+            let film = Sampler::new(id.0, id.1).film();
+            sink.put(&WaveSamples { number: index, film, pixels: &pixels, samples: &samples });
+        }
         for (k, (&pixel, &(x, y))) in numbers.iter().zip(&pixels).enumerate() {
             if let Err(reason) = tile.add(pixel, &samples.all[k], samples.differences(k)) {
                 first_rejected

@@ -8,7 +8,7 @@ use super::record::PathRecord;
 use super::seen;
 use super::thinning::Work;
 use super::tracer::PathTracer;
-use crate::film::{Differences, Needs, Neighbours, Sample};
+use crate::film::{CROSS, Differences, Needs, Neighbours, Sample};
 use crate::math::lanes::LANES;
 use crate::math::vec2;
 use crate::scene::Scene;
@@ -19,6 +19,8 @@ pub struct Wave<'a> {
     tracer: PathTracer<'a>,
     shift: Option<Box<dyn ShiftMapping>>,
     neighbours: Option<&'a Neighbours>,
+    /// Half-edges of the pixel of the film that has the most.
+    slots: usize,
     record: PathRecord,
     half_edges: HalfEdges,
     occlusion: bool,
@@ -30,9 +32,15 @@ pub struct Samples<'a> {
     /// The samples.
     pub all: &'a [Sample],
     half_edges: Option<&'a HalfEdges>,
+    slots: usize,
 }
 
 impl<'a> Samples<'a> {
+    /// Half-edges of the pixel of the film that has the most, if paths were shifted.
+    pub fn slots(&self) -> Option<usize> {
+        self.half_edges.map(|_| self.slots)
+    }
+
     /// The differences that a sample came with, if its path was shifted.
     pub fn differences(&self, index: usize) -> Option<Differences<'a>> {
         self.half_edges.map(|half_edges| half_edges.differences(index))
@@ -46,6 +54,7 @@ impl<'a> Wave<'a> {
             tracer: PathTracer::new(scene, needs),
             shift: needs.edges.is_sampled().then(|| shift.mapping(needs.ambient)),
             neighbours,
+            slots: neighbours.map_or(CROSS.count_ones() as usize, Neighbours::most),
             record: PathRecord::default(),
             half_edges: HalfEdges::default(),
             occlusion: needs.occlusion,
@@ -88,7 +97,7 @@ impl<'a> Wave<'a> {
                 }
             }
         }
-        Samples { all: &self.record.samples, half_edges: shifted.then_some(&self.half_edges) }
+        Samples { all: &self.record.samples, half_edges: shifted.then_some(&self.half_edges), slots: self.slots }
     }
 
     /// Work of the latest wave.

@@ -79,7 +79,7 @@ impl Probe {
 
     fn film(&self, run: u64, needs: Needs, shift: Shift) -> Film {
         let settings = RenderSettings { seed: run, shift, ..RenderSettings::new(Budget::Spp(self.spp), needs) };
-        let control = Control { stop: &AtomicBool::new(false), progress: &|_| {}, sink: None };
+        let control = Control { stop: &AtomicBool::new(false), ..Control::QUIET };
         render(&self.scene, settings, &control).film
     }
 

@@ -139,9 +139,13 @@ fn a_stop_leaves_an_image_of_what_there_is() {
     };
     let stop = AtomicBool::new(false);
     let progress = |_| stop.store(true, Ordering::Relaxed);
-    let outcome =
-        adaptive::run(&scene, &settings, &Control { stop: &stop, progress: &progress, sink: None }, &Context::QUIET)
-            .unwrap();
+    let outcome = adaptive::run(
+        &scene,
+        &settings,
+        &Control { stop: &stop, progress: &progress, ..Control::QUIET },
+        &Context::QUIET,
+    )
+    .unwrap();
     assert!(outcome.render.stopped && outcome.render.film.samples() < 40 * 30 * 64);
     assert!(outcome.solution.image.data.iter().all(|value| value.is_finite()));
 }

@@ -10,7 +10,7 @@ use fluxion::synthetic::{change, exact, picture};
 const SIZE: (usize, usize) = (31, 22);
 
 /// Methods that take any edges.
-const METHODS: [&str; 9] = [
+const METHODS: [&str; 10] = [
     "l2",
     "l1",
     "least_trimmed",
@@ -20,6 +20,7 @@ const METHODS: [&str; 9] = [
     "control_variate:weights=given",
     "control_variate:cross=on",
     "feature:prefilter=off",
+    "apr:prefilter=off",
 ];
 
 fn random(i: usize, k: u64) -> f32 {

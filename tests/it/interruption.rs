@@ -70,7 +70,7 @@ fn interrupted<T>(
     for times in 2.. {
         let stop = AtomicBool::new(false);
         let interruption = Interruption { tiles: AtomicU32::new(0), left: AtomicU32::new(times), stop: &stop, keep };
-        let control = Control { stop: &stop, progress: &|_| {}, sink: Some(&interruption) };
+        let control = Control { stop: &stop, sink: Some(&interruption), ..Control::QUIET };
         let (made, stopped) = work(kept.take(), &control);
         if !stopped {
             return made;

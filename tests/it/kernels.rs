@@ -10,8 +10,9 @@ use fluxion::film::{EdgeNeed, EdgeParts, Edges, Film, Kernel, Layer, Needs};
 use fluxion::neighbours::Selector;
 use fluxion::render::{Budget, Control, RenderOutcome, RenderSettings, Shift, render, resume};
 use fluxion::scene::Scene;
+use fluxion::scene::load::{self, Options};
 
-use crate::common::{bundled, check_zero, film};
+use crate::common::{bundled, check_zero, film, root};
 
 const ALL: EdgeParts = EdgeParts { variance: true, bins: true, ambient: true };
 
@@ -66,8 +67,9 @@ fn the_four_nearest_neighbours_are_the_cross_to_the_bit() {
 const RUNS: u64 = 16;
 
 /// Differences across every edge of a kernel minus those of independent images have mean zero.
-fn check_unbiased(name: &str, kernel: &str, shift: &str) {
-    let scene = bundled(name, (20, 16));
+fn check_unbiased(name: &str, kernel: &str, shift: &str, max_depth: Option<u32>) {
+    let options = Options { size: Some((20, 16)), max_depth, ..Options::default() };
+    let scene = load::load(&root().join("scenes").join(name).join("scene.xml"), &options).unwrap();
     let shift = Shift::named(shift).unwrap();
     // Neighbours of the first run, for all: runs with neighbours of their own could not be compared edge by edge.
     let first = kernel_film(&scene, RenderSettings { shift, ..settings(kernel, 4, 99, NEEDS) });
@@ -95,7 +97,7 @@ const NEEDS: Needs = Needs { features: true, ..Needs::EDGES };
 
 macro_rules! unbiased {
     ($($test:ident: $scene:literal, $kernel:literal, $shift:literal;)*) => {
-        $(#[test] fn $test() { check_unbiased($scene, $kernel, $shift); })*
+        $(#[test] fn $test() { check_unbiased($scene, $kernel, $shift, None); })*
     };
 }
 
@@ -109,6 +111,13 @@ unbiased! {
     unbiased_to_random_neighbours_from_one_end: "unit/occluder", "random", "replay";
     unbiased_to_similar_neighbours_from_one_end: "unit/dielectric", "structure", "replay";
     unbiased_to_the_window: "unit/environment", "nearest:k=24", "reconnect";
+}
+
+#[test]
+fn direct_light_is_unbiased_by_either_shift() {
+    for shift in ["reconnect", "replay"] {
+        check_unbiased("unit/occluder", "random", shift, Some(2));
+    }
 }
 
 #[test]
@@ -181,7 +190,7 @@ fn renders_that_were_interrupted_choose_the_same_neighbours() {
 #[test]
 fn the_command_line_says_which_methods_take_which_neighbours() {
     let folder = tempfile::tempdir().unwrap();
-    let scene = crate::common::root().join("scenes/unit/diffuse/scene.xml");
+    let scene = root().join("scenes/unit/diffuse/scene.xml");
     let run = |extra: &[&str]| {
         let mut command = Command::cargo_bin("fluxion").unwrap();
         command.current_dir(folder.path()).arg("render").arg(&scene);
@@ -231,20 +240,16 @@ fn the_command_line_says_which_methods_take_which_neighbours() {
 
 #[test]
 fn a_depth_given_is_that_of_the_scene() {
-    let load = |depth: Option<u32>| {
-        let path = crate::common::root().join("scenes/cornell-box/scene.xml");
-        let options = fluxion::scene::load::Options {
-            size: Some((16, 16)),
-            max_depth: depth,
-            ..fluxion::scene::load::Options::default()
-        };
-        fluxion::scene::load::load(&path, &options).unwrap()
+    let with_depth = |depth: Option<u32>| {
+        let path = root().join("scenes/cornell-box/scene.xml");
+        let options = Options { size: Some((16, 16)), max_depth: depth, ..Options::default() };
+        load::load(&path, &options).unwrap()
     };
     let brightness = |depth| {
-        let frame = film(&load(depth), 32, 1, Needs::default()).develop();
+        let frame = film(&with_depth(depth), 32, 1, Needs::default()).develop();
         frame.get(Layer::Color).unwrap().data.iter().sum::<f32>()
     };
     let (own, direct, none) = (brightness(None), brightness(Some(2)), brightness(Some(1)));
     assert!(none == 0.0 && direct > 0.0 && direct < 0.95 * own, "{none} {direct} {own}");
-    assert_ne!(load(Some(2)).fingerprint(), load(None).fingerprint());
+    assert_ne!(with_depth(Some(2)).fingerprint(), with_depth(None).fingerprint());
 }

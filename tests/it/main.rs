@@ -24,6 +24,7 @@ mod nn;
 mod oidn;
 mod outputs;
 mod report;
+mod samples;
 mod stress;
 mod textures;
 mod vocabulary;

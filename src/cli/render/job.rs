@@ -9,7 +9,8 @@ use fluxion::image::io::{DataWindow, failed_lookups};
 use fluxion::neighbours::Selector;
 use fluxion::reconstruct::{Reconstruction, Solution};
 use fluxion::reference::fingerprint;
-use fluxion::render::{self, Budget, Control, RenderOutcome, RenderSettings, SampleId};
+use fluxion::render::{self, Budget, Control, RenderOutcome, RenderSettings, SampleId, SampleSink};
+use fluxion::samples::SampleWriter;
 use fluxion::scene::Scene;
 
 use super::{Args, shift};
@@ -71,7 +72,7 @@ impl Job<'_> {
         bar.set_message("rendering");
         let report = |share| progress::set(&bar, share);
         let sink = self.sink.map(|sink| sink as &dyn render::CheckpointSink);
-        let done = work(&Control { stop: &stop, progress: &report, sink });
+        let done = work(&Control { stop: &stop, progress: &report, sink, samples: None });
         bar.finish_and_clear();
         done
     }
@@ -79,18 +80,24 @@ impl Job<'_> {
     /// The same number of samples for every pixel.
     fn straight(&self, start: Start, stats: &mut Stats) -> Result<Rendered> {
         let args = self.args;
-        let budget = match args.time {
-            Some(time) => Budget::Time(time),
-            None => Budget::Spp(args.spp.unwrap_or(self.scene.sensor().spp)),
-        };
+        let spp = args.spp.unwrap_or(self.scene.sensor().spp);
+        let budget = args.time.map_or(Budget::Spp(spp), Budget::Time);
+        let folder = args.samples.as_deref();
+        let writer = folder.map(|folder| SampleWriter::new(folder, self.scene, spp)).transpose()?;
         let settings = self.settings(start.render.film.needs, budget);
-        let outcome = self.controlled(|control| Ok(render::resume(self.scene, settings, control, start.render)))?;
+        let outcome = self.controlled(|control| {
+            let control = Control { samples: writer.as_ref().map(|writer| writer as &dyn SampleSink), ..*control };
+            Ok(render::resume(self.scene, settings, &control, start.render))
+        })?;
         self.warn(&outcome);
         stats.rendered(&outcome);
         let developing = Instant::now();
         let frame = self.complete(outcome.film.develop(), stats);
         stats.seconds.develop = developing.elapsed().as_secs_f64();
-        let layers = self.save_layers(&frame, stats);
+        let mut layers = self.save_layers(&frame, stats);
+        if let Some(writer) = writer {
+            layers = layers.and(Ok(writer.finish(&outcome.film, &frame.provenance)?));
+        }
         let solution = args.method.solve(self.method, &frame, args.quiet, stats)?;
         Ok(Rendered { frame, solution, layers })
     }
@@ -179,7 +186,7 @@ impl Job<'_> {
             seconds: format!("{:.3}", stats.seconds.render),
             method: self.args.method.method.clone(),
             plan: stats.plan.clone(),
-            kernel: if self.kernel.is_cross() { String::new() } else { self.kernel.to_string() },
+            kernel: stats.kernel.clone(),
             ..Provenance::new()
         }
     }

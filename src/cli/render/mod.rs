@@ -65,6 +65,9 @@ pub struct Args {
     /// EXR file of all recorded layers, for `fluxion reconstruct`
     #[arg(long, value_name = "FILE")]
     layers: Option<PathBuf>,
+    /// Folder for every camera sample's colour, features and differences, as arrays for NumPy
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["time", "adaptive", "target_error", "checkpoint"])]
+    samples: Option<PathBuf>,
     /// Record the statistics of eight groups of samples, the even ones independent of the odd ones, in the layers
     #[arg(long, requires = "layers")]
     bins: bool,
@@ -155,8 +158,9 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         Shifted::Auto => method.needs(),
     };
     let needed = kernel::needs(needed, &kernel);
-    let saved = match &args.layers {
-        Some(_) => Needs {
+    let saved = match (&args.layers, &args.samples) {
+        (None, Some(_)) => Needs { features: true, ..Needs::default() },
+        (Some(_), _) => Needs {
             features: true,
             edges: needed.edges,
             bins: args.bins,
@@ -165,7 +169,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             ambient: args.ambient,
             alpha: false,
         },
-        None => Needs::default(),
+        (None, None) => Needs::default(),
     };
     let plan = match args.plan {
         Planned::Needed => Plan::new(&scene, needed, saved),
@@ -174,7 +178,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             Plan::all(&scene)
         }
     };
-    stats.plan = plan.summary();
+    let plan = plan.with_kernel(&kernel);
+    (stats.plan, stats.kernel) = (plan.summary(), kernel.name());
     if let Some(sample) = args.replay {
         return replay(args, &scene, sample);
     }

@@ -72,6 +72,14 @@ impl Default for Sensor {
     }
 }
 
+impl Sensor {
+    /// A normal in the camera's space, where x is to the left, y up and z into the picture.
+    pub fn to_camera(&self, normal: Vec3) -> Vec3 {
+        // Normals go from camera to world by the inverse's transpose, and back by the transpose.
+        (self.to_world.transpose() * normal.extend(0.0)).truncate().normalize_or_zero()
+    }
+}
+
 /// How a film position becomes a ray.
 #[derive(Clone, Copy, Debug)]
 enum Projection {

@@ -20,25 +20,42 @@ pub enum Number {
     Float16,
 }
 
+impl Number {
+    /// The name of the type in headers.
+    pub fn descriptor(self) -> &'static str {
+        match self {
+            Self::Float32 => "<f4",
+            Self::Float16 => "<f2",
+        }
+    }
+}
+
+/// The largest half-precision number.
+const LARGEST: f32 = 65504.0;
+
 /// Writes an array in the order of its last index, whole or not at all.
 pub fn write(path: &Path, shape: &[usize], data: &[f32], number: Number) -> Result<()> {
     assert_eq!(shape.iter().product::<usize>(), data.len(), "as many numbers as the shape says");
-    let (descriptor, body) = match number {
-        Number::Float32 => ("<f4", data.iter().flat_map(|value| value.to_le_bytes()).collect()),
-        Number::Float16 => ("<f2", halves(data)),
+    let body = match number {
+        Number::Float32 => data.iter().flat_map(|value| value.to_le_bytes()).collect(),
+        Number::Float16 => halves(data),
     };
+    files::write(path, [header(shape, number), body].concat())
+}
+
+/// Everything before the numbers of an array.
+pub fn header(shape: &[usize], number: Number) -> Vec<u8> {
     let shape: String = shape.iter().map(|length| format!("{length}, ")).collect();
-    let mut header = format!("{{'descr': '{descriptor}', 'fortran_order': False, 'shape': ({shape}), }}");
+    let mut header = format!("{{'descr': '{}', 'fortran_order': False, 'shape': ({shape}), }}", number.descriptor());
     // Magic bytes, version and length are ten bytes; the data begin at a multiple of 64.
     let padding = (header.len() + 11).next_multiple_of(64) - header.len() - 11;
     header.extend(std::iter::repeat_n(' ', padding).chain(['\n']));
     let length = (header.len() as u16).to_le_bytes();
-    files::write(path, [b"\x93NUMPY\x01\x00", length.as_slice(), header.as_bytes(), &body].concat())
+    [b"\x93NUMPY\x01\x00", length.as_slice(), header.as_bytes()].concat()
 }
 
 fn halves(data: &[f32]) -> Vec<u8> {
-    let limit = f16::MAX.to_f32();
-    let clamped: Vec<f32> = data.iter().map(|value| value.clamp(-limit, limit)).collect();
+    let clamped: Vec<f32> = data.iter().map(|value| value.clamp(-LARGEST, LARGEST)).collect();
     let mut halves = vec![f16::ZERO; data.len()];
     halves.convert_from_f32_slice(&clamped);
     halves.iter().flat_map(|half| half.to_le_bytes()).collect()

@@ -1,0 +1,96 @@
+"""Reconstructions on the cross and on other kernels at equal samples, as the tables of docs/kernels.md.
+
+    python tools/kernels.py SCENES REFERENCES [--depth N] [--spp 16,64] [--seeds 3] [--kernels cross,structure] [--shift reconnect]
+
+SCENES is a folder with NAME/scene.xml; REFERENCES one with NAME.exr and NAME_var.exr. With a depth other than the scenes' own the
+references are rendered here, by path tracing with 8192 samples of another seed. Errors are means over seeds and geometric means over
+scenes. Run from the repository's top folder after `cargo build --release`. Needs PyPI openimageio and numpy.
+"""
+import argparse
+import json
+import math
+import os
+import statistics
+import subprocess
+import tempfile
+
+import numpy as np
+
+import exr
+
+FLUXION = os.environ.get("FLUXION", "target/release/fluxion")
+NAMES = ("cornell-box", "kitchen", "veach-ajar", "living-room", "classroom", "staircase")
+WEIGHTS = ("uniform", "variance")
+
+
+def run(*arguments):
+    return subprocess.run([FLUXION, *map(str, arguments)], check=True, capture_output=True, text=True).stdout
+
+
+def reference(args, name, folder):
+    """File and size of a reference, rendered if the depth is not the scene's."""
+    path = os.path.join(args.references, name + ".exr")
+    width, height = np.stack([exr.everything(path)[c] for c in "RGB"], -1).shape[1::-1]
+    if args.depth:
+        path = os.path.join(folder, "%s-%d.exr" % (name, args.depth))
+        run("render", scene(args, name), "-o", path, "-q", "--size", "%dx%d" % (width, height), "--spp", 8192, "--seed", 977,
+            "--method", "primal", "--max-depth", args.depth)
+    return path, "%dx%d" % (width, height)
+
+
+def scene(args, name):
+    return os.path.join(args.scenes, name, "scene.xml")
+
+
+def errors(args, folder, name, path, size, kernel, spp, seed):
+    """Metrics by weights, and the seconds of rendering."""
+    layers, image, stats = (os.path.join(folder, file) for file in ("l.exr", "i.exr", "s.json"))
+    depth = ["--max-depth", args.depth] if args.depth else []
+    run("render", scene(args, name), "-o", image, "-q", "--size", size, "--spp", spp, "--seed", seed, "--layers", layers,
+        "--method", "control_variate", "--kernel", kernel, "--shift", args.shift, "--json", stats, *depth)
+    found = {}
+    for weights in WEIGHTS:
+        run("reconstruct", layers, "-o", image, "-q", "--method", "control_variate:weights=" + weights)
+        found[weights] = json.loads(run("compare", image, path, "--json"))
+    with open(stats) as file:
+        return found, json.load(file)["seconds"]["render"]
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("scenes")
+    parser.add_argument("references")
+    parser.add_argument("--depth", type=int)
+    parser.add_argument("--spp", default="16,64")
+    parser.add_argument("--seeds", type=int, default=3)
+    parser.add_argument("--kernels", default="cross,structure")
+    parser.add_argument("--shift", default="reconnect")
+    args = parser.parse_args()
+    # Parameters of a kernel are given with + in place of a comma.
+    kernels = [kernel.replace("+", ",") for kernel in args.kernels.split(",")]
+    print("| spp | weights | kernel | SMAPE | FLIP | relMSE | relMSE / first | worst | time / first |")
+    print("|---|---|---|---|---|---|---|---|---|")
+    with tempfile.TemporaryDirectory() as folder:
+        references = {name: reference(args, name, folder) for name in NAMES}
+        for spp in args.spp.split(","):
+            of = {(weights, kernel): [] for weights in WEIGHTS for kernel in kernels}
+            for name in NAMES:
+                runs = {key: [] for key in of}
+                for seed in range(1, args.seeds + 1):
+                    for kernel in kernels:
+                        found, seconds = errors(args, folder, name, *references[name], kernel, spp, seed)
+                        for weights in WEIGHTS:
+                            metrics = found[weights]
+                            runs[weights, kernel].append((metrics["smape"], metrics["flip"], metrics["relmse"], seconds))
+                for key, values in runs.items():
+                    of[key].append([statistics.mean(column) for column in zip(*values)])
+            for (weights, kernel), rows in of.items():
+                mean = [math.exp(statistics.mean(math.log(row[k]) for row in rows)) for k in range(4)]
+                ratios = [[a[k] / b[k] for a, b in zip(rows, of[weights, kernels[0]])] for k in range(4)]
+                product = [math.exp(statistics.mean(map(math.log, column))) for column in ratios]
+                print("| %s | %s | %s | %.3f | %.3f | %.4f | %.2f | %.2f | %.2f |" % (
+                    spp, weights, kernel, *mean[:3], product[2], max(ratios[2]), product[3]), flush=True)
+
+
+if __name__ == "__main__":
+    main()
