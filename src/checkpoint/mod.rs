@@ -1,15 +1,21 @@
 //! Checkpoints: an unfinished film with everything that is needed to resume it, bit for bit, or to add it to others.
 
 mod file;
+mod header;
+mod merge;
 mod origin;
 
 use std::sync::Mutex;
 
-pub use self::file::{is_one, load, save};
+pub use self::file::{load, save};
+pub use self::header::is_one;
+pub use self::merge::{Merged, develop, merge};
 pub use self::origin::{Origin, Run, content};
 use crate::adaptive::{self, Journal};
-use crate::film::Frame;
-use crate::render::RenderOutcome;
+use crate::error::Result;
+use crate::film::{Frame, Rejected};
+use crate::render::{RenderOutcome, SampleId};
+use std::path::Path;
 
 /// A film and where it comes from.
 pub struct Checkpoint {
@@ -19,6 +25,25 @@ pub struct Checkpoint {
     pub outcome: RenderOutcome,
     /// Decisions of an adaptive run.
     pub journal: Option<Journal>,
+}
+
+/// The content of a checkpoint as far as its header says.
+pub struct Summary {
+    /// Scene, settings and sample numbers.
+    pub origin: Origin,
+    /// Seconds of rendering.
+    pub seconds: f64,
+    /// Whether it belongs to an adaptive run.
+    pub adaptive: bool,
+    /// The first sample that was not finite, and the reason.
+    pub rejected: Option<(SampleId, Rejected)>,
+}
+
+/// Reads what a checkpoint holds, without its statistics.
+pub fn summary(path: &Path) -> Result<Summary> {
+    let header = header::Reader::open(path, 1 << 16)?.header;
+    let (seconds, adaptive, rejected) = (header.seconds, header.adaptive.is_some(), header.rejected());
+    Ok(Summary { origin: header.origin, seconds, adaptive, rejected })
 }
 
 impl Checkpoint {
@@ -31,27 +56,5 @@ impl Checkpoint {
     /// The film's means and variances.
     pub fn develop(&self) -> Frame {
         self.outcome.film.develop().with_provenance(self.origin.provenance(&self.outcome))
-    }
-
-    /// Adds the samples of another checkpoint, as if they had been taken after those here. The error is the reason why
-    /// they do not belong together. Sums in single precision depend on their order: callers sort films by their runs, so
-    /// that the order of arguments changes no bit.
-    pub fn merge(&mut self, other: Self) -> Result<(), String> {
-        self.origin.adds_to(&other.origin)?;
-        if self.outcome.film.kernel() != other.outcome.film.kernel() {
-            return Err(
-                "has chosen other neighbours by its own pilot: films that are to be merged take a --kernel without \
-                        a pilot"
-                    .into(),
-            );
-        }
-        self.outcome.film.merge(&other.outcome.film);
-        self.outcome.elapsed += other.outcome.elapsed;
-        self.outcome.first_rejected = self.outcome.first_rejected.or(other.outcome.first_rejected);
-        self.outcome.spp = self.outcome.film.fewest_samples();
-        self.origin.runs.extend(other.origin.runs);
-        // Decisions were made for each of them alone.
-        self.journal = None;
-        Ok(())
     }
 }

@@ -88,8 +88,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     for scene in &scenes {
         let case = load(args, scene)?;
         let mut report = |what: &str| {
-            bar.set_message(format!("{}, {what}", case.name));
-            progress::set(&bar, done as f32 / total as f32);
+            bar.set_message(&format!("{}, {what}", case.name));
+            bar.set(done as f32 / total as f32);
             done += 1;
         };
         let runs = Runs { methods: &methods, budgets: &budgets, seeds: args.seeds };
@@ -98,7 +98,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             break;
         }
     }
-    bar.finish_and_clear();
+    bar.finish();
     store.save()?;
     write_page(args, &store, &scenes, &budgets, baseline.as_ref())?;
     let summary = Summary::new(&store.results, "relmse");

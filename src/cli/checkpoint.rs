@@ -9,10 +9,11 @@ use fluxion::adaptive::{Journal, Start};
 use fluxion::checkpoint::{self, Checkpoint, Origin};
 use fluxion::error::Error;
 use fluxion::ffi::memory::say_what_is_kept;
+use fluxion::files::Lock;
 use fluxion::render::{self, RenderOutcome};
 
-use super::progress;
 use super::terminal::note;
+use super::{interrupt, progress};
 
 /// Options of checkpoints.
 #[derive(clap::Args)]
@@ -43,6 +44,11 @@ impl Args {
         }
     }
 
+    /// Locks the checkpoint's file, so that no twin of this process works on it.
+    pub fn lock(&self) -> Result<Option<Lock>> {
+        Ok(self.checkpoint.as_deref().map(Lock::new).transpose()?)
+    }
+
     /// The checkpoint to resume from, if there is one and it is asked for.
     pub fn load(&self, wanted: &Origin) -> Result<Option<Checkpoint>> {
         let Some(path) = self.checkpoint.as_ref().filter(|path| self.resume && is_there(path)) else {
@@ -54,13 +60,13 @@ impl Args {
     }
 
     /// The writer of checkpoints of a render, if they are asked for.
-    pub fn sink<'a>(&'a self, origin: Origin, start: &Start<'a>) -> Option<CheckpointWriter<'a>> {
+    pub fn sink<'a>(&'a self, origin: Origin, start: &Start<'a>, lock: Lock) -> Option<CheckpointWriter<'a>> {
         let now = Instant::now();
         let kept = start.render.film.samples();
         let state = State { next: now + self.checkpoint_every, kept, taken: now, failed: None };
         let (path, every) = (self.checkpoint.as_deref()?, self.checkpoint_every);
         say_what_is_kept(format!("; the last checkpoint, if there was time for one, is kept in {}", path.display()));
-        Some(CheckpointWriter { path, every, origin, journal: start.journal, state: Mutex::new(state) })
+        Some(CheckpointWriter { path, every, origin, journal: start.journal, state: Mutex::new(state), _lock: lock })
     }
 }
 
@@ -75,6 +81,7 @@ pub struct CheckpointWriter<'a> {
     origin: Origin,
     journal: &'a Mutex<Journal>,
     state: Mutex<State>,
+    _lock: Lock,
 }
 
 struct State {
@@ -96,7 +103,10 @@ impl CheckpointWriter<'_> {
     pub fn conclude(&self, made: Result<()>) -> Result<()> {
         let mut state = self.state();
         match (made, state.failed.take()) {
-            (Ok(()), None) => Ok(()),
+            (Ok(()), None) => {
+                interrupt::saved();
+                Ok(())
+            }
             (Ok(()), Some(failed)) => Err(failed.into()),
             (Err(error), _) if state.kept == 0 => Err(error),
             (Err(error), _) => Err(error.context(format!(

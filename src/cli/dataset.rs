@@ -158,8 +158,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let (stop, bar) = (super::interrupt::stop_on_signal()?, progress::bar(args.quiet));
     let (mut there, total) = (names.len() - due.len(), due.len() as f32);
     for (done, &k) in due.iter().enumerate() {
-        bar.set_message(names[k].clone());
-        let report = |share| progress::set(&bar, (done as f32 + share) / total);
+        bar.set_message(&names[k]);
+        let report = |share| bar.set((done as f32 + share) / total);
         report(0.0);
         let scene = super::scene::load(&args.scenes[k], &args.options.options())?;
         let frame = (folder.as_path(), names[k].as_str());
@@ -168,7 +168,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         }
         there += 1;
     }
-    bar.finish_and_clear();
+    bar.finish();
     out!("{}: {there} of {} frames", folder.display(), names.len())?;
     Ok(ExitCode::SUCCESS)
 }

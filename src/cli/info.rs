@@ -20,7 +20,8 @@ use fluxion::scene::{Scene, bsdf, emitter, load, sensor, shape, texture};
 /// Options of `info`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Scene file to describe
+    /// Scene file to describe, or a checkpoint, or an EXR file of layers
+    #[arg(value_name = "FILE")]
     scene: Option<PathBuf>,
     /// Method whose needs the plan is made for
     #[arg(long, default_value = reconstruct::DEFAULT, value_name = "NAME[:KEY=VALUE,...]")]
@@ -62,6 +63,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         KERNELS.iter().try_for_each(|kernel| out!("{:>10}  {}; {}", kernel.id, kernel.summary, kernel.takes()))?;
     }
     match &args.scene {
+        Some(path) if super::stored::describe(path)? => {}
         Some(path) => {
             let options = load::Options { sensor_optional: true, ..args.options.options() };
             describe(&super::scene::load(path, &options)?, &args.method)?;

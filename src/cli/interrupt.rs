@@ -13,6 +13,12 @@ use super::terminal::note;
 /// The first signal that came; 0 for none.
 static SIGNAL: AtomicI32 = AtomicI32::new(0);
 
+/// Whether a checkpoint holds everything that was done.
+static SAVED: AtomicBool = AtomicBool::new(false);
+
+/// Exit code of work that was stopped and can be resumed, by which schedulers requeue it: a temporary failure, `EX_TEMPFAIL`.
+const RESUMABLE: u8 = 75;
+
 /// Exit codes of programs that a signal ended, less the signal's number.
 const SIGNALLED: i32 = 128;
 
@@ -37,8 +43,14 @@ pub fn stop_on_signal() -> Result<Arc<AtomicBool>> {
     Ok(stop)
 }
 
-/// The exit code of a command that was stopped by a signal.
+/// The exit code of a command that was stopped by a signal: [`RESUMABLE`] if everything was saved.
 pub fn stopped() -> Option<ExitCode> {
     let signal = SIGNAL.load(Ordering::Relaxed);
-    (signal != 0).then(|| ExitCode::from((SIGNALLED + signal) as u8))
+    let code = if SAVED.load(Ordering::Relaxed) { RESUMABLE } else { (SIGNALLED + signal) as u8 };
+    (signal != 0).then(|| ExitCode::from(code))
+}
+
+/// Says that what was done so far is saved and can be resumed.
+pub fn saved() {
+    SAVED.store(true, Ordering::Relaxed);
 }

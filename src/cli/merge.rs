@@ -5,7 +5,6 @@ use std::process::ExitCode;
 
 use anyhow::Result;
 use fluxion::checkpoint;
-use fluxion::error::Error;
 use fluxion::film::exr;
 
 use super::outputs::Claims;
@@ -26,24 +25,15 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<ExitCode> {
     let inputs: Vec<_> = args.films.iter().map(PathBuf::as_path).collect();
     let _claims = Claims::new(&[], &[&Some(args.output.clone())], &inputs)?;
-    // In the order of their samples, so that the order of the arguments changes no bit.
-    let mut films = Vec::new();
-    for path in &args.films {
-        films.push((checkpoint::load(path)?, path));
-    }
-    films.sort_by(|(a, _), (b, _)| a.origin.runs.cmp(&b.origin.runs));
-    let mut films = films.into_iter();
-    let Some((mut all, first)) = films.next() else { return Ok(ExitCode::SUCCESS) };
-    for (film, path) in films {
-        let refused = |why: String| Error::mismatch(path, format!("cannot be added to {}: it {why}", first.display()));
-        all.merge(film).map_err(refused)?;
-    }
-    if args.output.extension().is_some_and(|extension| extension == "exr") {
-        exr::save(&args.output, &all.develop())?;
+    let is_frame = args.output.extension().is_some_and(|extension| extension == "exr");
+    let merged = if is_frame {
+        let (frame, merged) = checkpoint::develop(&args.films, &args.output)?;
+        exr::save(&args.output, &frame)?;
+        merged
     } else {
-        checkpoint::save(&args.output, &all.origin, &all.outcome, None)?;
-    }
-    let spp = all.outcome.film.samples() as f64 / (all.origin.size.0 * all.origin.size.1) as f64;
-    out!("{}: {spp:.1} samples per pixel of {} runs", args.output.display(), all.origin.runs.len())?;
+        checkpoint::merge(&args.films, &args.output)?
+    };
+    let spp = merged.samples as f64 / (merged.origin.size.0 * merged.origin.size.1) as f64;
+    out!("{}: {spp:.1} samples per pixel of {} runs", args.output.display(), merged.origin.runs.len())?;
     Ok(ExitCode::SUCCESS)
 }

@@ -55,11 +55,11 @@ impl Args {
         let start = Instant::now();
         let bar = progress::bar(quiet);
         let report = |what: &str, share| {
-            bar.set_message(what.to_owned());
-            progress::set(&bar, share);
+            bar.set_message(what);
+            bar.set(share);
         };
         let solution = reconstruct::solve(method, frame, &self.context(&report))?;
-        bar.finish_and_clear();
+        bar.finish();
         stats.seconds.reconstruct = start.elapsed().as_secs_f64();
         self.write_notes(&solution, frame)?;
         Ok(solution)

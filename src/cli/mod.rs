@@ -16,6 +16,7 @@ mod reference;
 mod render;
 mod scene;
 mod stats;
+mod stored;
 mod stress;
 pub mod terminal;
 mod validate;
@@ -30,6 +31,9 @@ use clap::{Parser, Subcommand};
 #[derive(Parser)]
 #[command(name = "fluxion", version, arg_required_else_help = true, propagate_version = true)]
 pub struct Args {
+    /// How long work tells how far it is; --quiet tells nothing
+    #[arg(long, global = true, default_value = "auto", value_enum, hide_short_help = true, value_name = "STYLE")]
+    progress: progress::Style,
     #[command(subcommand)]
     command: Command,
 }
@@ -58,9 +62,10 @@ enum Command {
     Validate(validate::Args),
 }
 
-/// Runs a command. The exit code is 1 for a check that failed, 128 and the number of a signal for work that one has
-/// stopped; errors are the caller's to print.
+/// Runs a command. The exit code is 1 for a check that failed; for work that a signal has stopped it is 75 if a checkpoint holds
+/// all of it, else 128 and the signal's number; errors are the caller's to print.
 pub fn run(args: Args) -> Result<ExitCode> {
+    progress::choose(args.progress);
     let code = match args.command {
         Command::Render(args) => render::run(&args),
         Command::Reconstruct(args) => reconstruct::run(&args),

@@ -1,25 +1,129 @@
-//! A progress bar on standard error, only where someone is watching.
+//! Progress: a bar where someone is watching, lines where nobody is, or where a program reads them.
 
-use std::time::Duration;
+use std::io::IsTerminal;
+use std::sync::{Mutex, OnceLock};
+use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-const STEPS: u64 = 1000;
+use super::terminal::{note, out};
 
-/// A bar with the time left.
-pub fn bar(quiet: bool) -> ProgressBar {
-    let bar = ProgressBar::new(STEPS);
-    bar.set_draw_target(if quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr_with_hz(5) });
-    if let Ok(style) = ProgressStyle::with_template("{msg:12} [{bar:40}] {percent:>3}%  {elapsed} elapsed, {eta} left")
-    {
-        bar.set_style(style.progress_chars("=> "));
-    }
-    bar
+/// How progress is shown.
+#[derive(Clone, Copy, Debug, Default, PartialEq, clap::ValueEnum)]
+pub enum Style {
+    /// A bar on terminals, elsewhere a line every half minute.
+    #[default]
+    Auto,
+    /// A line for people every half minute, on standard error.
+    Plain,
+    /// An object a line with stage, share and seconds, on standard error.
+    Json,
+    /// Lines that Alfred, Tractor and Afanasy read, on standard output.
+    Alf,
+    /// Lines that Open Job Description reads, on standard output.
+    Openjd,
 }
 
-/// Moves the bar to a share in [0, 1].
-pub fn set(bar: &ProgressBar, share: f32) {
-    bar.set_position((share.clamp(0.0, 1.0) * STEPS as f32) as u64);
+/// The style of this process.
+static STYLE: OnceLock<Style> = OnceLock::new();
+
+/// Sets the style; to be called before any progress is made.
+pub fn choose(style: Style) {
+    let _ = STYLE.set(style);
+}
+
+/// Progress of one piece of work.
+pub struct Progress {
+    drawn: ProgressBar,
+    lines: Option<Mutex<Lines>>,
+}
+
+/// State of progress in lines.
+struct Lines {
+    style: Style,
+    stage: String,
+    start: Instant,
+    /// When the next line is due.
+    next: Instant,
+}
+
+const STEPS: u64 = 1000;
+
+/// Progress that starts now.
+pub fn bar(quiet: bool) -> Progress {
+    let drawn = ProgressBar::new(STEPS);
+    let style = match STYLE.get().copied().unwrap_or_default() {
+        Style::Auto if std::io::stderr().is_terminal() => None,
+        Style::Auto => Some(Style::Plain),
+        style => Some(style),
+    };
+    let hidden = quiet || style.is_some();
+    drawn.set_draw_target(if hidden { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr_with_hz(5) });
+    if let Ok(style) = ProgressStyle::with_template("{msg:12} [{bar:40}] {percent:>3}%  {elapsed} elapsed, {eta} left")
+    {
+        drawn.set_style(style.progress_chars("=> "));
+    }
+    let now = Instant::now();
+    let lines = style
+        .filter(|_| !quiet)
+        .map(|style| Mutex::new(Lines { style, stage: String::new(), start: now, next: now + pause(style) }));
+    Progress { drawn, lines }
+}
+
+/// Time between two lines.
+fn pause(style: Style) -> Duration {
+    Duration::from_secs(if style == Style::Plain { 30 } else { 1 })
+}
+
+impl Progress {
+    /// Names the stage.
+    pub fn set_message(&self, stage: &str) {
+        self.drawn.set_message(stage.to_owned());
+        if let Some(lines) = &self.lines {
+            stage.clone_into(&mut lines.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).stage);
+        }
+    }
+
+    /// Moves to a share in [0, 1].
+    pub fn set(&self, share: f32) {
+        let share = share.clamp(0.0, 1.0);
+        self.drawn.set_position((share * STEPS as f32) as u64);
+        if let Some(lines) = &self.lines {
+            lines.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).tell(share);
+        }
+    }
+
+    /// Takes the bar away.
+    pub fn finish(&self) {
+        self.drawn.finish_and_clear();
+    }
+}
+
+impl Lines {
+    /// Writes a line, if one is due.
+    fn tell(&mut self, share: f32) {
+        let now = Instant::now();
+        if now < self.next {
+            return;
+        }
+        self.next = now + pause(self.style);
+        let (elapsed, percent) = (self.start.elapsed().as_secs_f64(), (100.0 * share) as u32);
+        let left = elapsed / f64::from(share.max(1e-6)) - elapsed;
+        // Nobody may be reading, which is no reason to stop.
+        let _ = match self.style {
+            Style::Json => {
+                let line = serde_json::json!({ "stage": self.stage, "share": share, "seconds": elapsed, "left": left });
+                note!("{line}");
+                Ok(())
+            }
+            Style::Alf => out!("ALF_PROGRESS {percent}%"),
+            Style::Openjd => out!("openjd_progress: {percent}"),
+            Style::Auto | Style::Plain => {
+                note!("{} {percent} %, {elapsed:.0} s elapsed, {left:.0} s left", self.stage);
+                Ok(())
+            }
+        };
+    }
 }
 
 /// Seconds with as many digits as are worth reading.

@@ -72,14 +72,14 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let stop = super::interrupt::stop_on_signal()?;
     let bar = progress::bar(args.quiet);
     while let Some(spp) = next_wave(args, &reference) {
-        bar.set_message(format!("{} spp, floor {:.1e}, next wave", reference.spp, reference.floor()));
-        let report = |share| progress::set(&bar, share);
+        bar.set_message(&format!("{} spp, floor {:.1e}, next wave", reference.spp, reference.floor()));
+        let report = |share| bar.set(share);
         if !reference.add_wave(&scene, spp / 2, &Control { stop: &stop, progress: &report, ..Control::QUIET })? {
             break;
         }
         reference.save(&args.output, args.half)?;
     }
-    bar.finish_and_clear();
+    bar.finish();
     if there {
         // It may be there as floats and wanted as half floats.
         reference.save(&args.output, args.half)?;

@@ -68,19 +68,19 @@ pub enum Kernel {
 impl Film {
     /// An empty film.
     pub fn new(width: usize, height: usize, needs: Needs) -> Self {
-        let mut tiles = Vec::new();
-        for y in (0..height).step_by(TILE) {
-            for x in (0..width).step_by(TILE) {
-                tiles.push(Tile::new((x, y), (TILE.min(width - x), TILE.min(height - y)), needs));
-            }
-        }
+        let tiles = Tile::all((width, height), needs, &Kernel::Cross).collect();
         Self { width, height, needs, kernel: Kernel::Cross, tiles }
+    }
+
+    /// A film of all its tiles.
+    pub(crate) fn of_tiles((width, height): (usize, usize), needs: Needs, kernel: Kernel, tiles: Vec<Tile>) -> Self {
+        Self { width, height, needs, kernel, tiles }
     }
 
     /// The film without half-edges, which are recorded from when its neighbours are chosen.
     pub fn pending(mut self) -> Self {
-        let (size, none) = ((self.width, self.height), vec![0; self.width * self.height]);
-        self.choose(Neighbours::new(size, none, false));
+        let needs = self.needs;
+        self.tiles.iter_mut().for_each(|tile| tile.set_half_edges(needs, |_| 0));
         self.kernel = Kernel::Pending;
         self
     }
@@ -235,7 +235,9 @@ mod tests {
         assert_eq!((film.tiles_mut()[0].count(0), film.tiles_mut()[0].edge_count(0)), (32, 8));
         let mut bytes = Vec::new();
         film.write(&mut bytes).unwrap();
-        assert_eq!(Film::new(2, 1, Needs::ALL).read(&mut bytes.as_slice()).unwrap(), film);
+        let mut tile = Tile::all((2, 1), Needs::ALL, &Kernel::Cross).next().unwrap();
+        tile.read(None, &mut bytes.as_slice()).unwrap();
+        assert_eq!(tile, film.tiles[0]);
         // The edges are those of the samples that had differences, as if there had been no others.
         let (frame, dense) = (film.develop(), dense.develop());
         for layer in [Layer::Dx, Layer::DxVariance, Layer::BinDx(3), Layer::BinAmbientDx(7)] {

@@ -27,7 +27,8 @@ fn take(from: &mut impl Read, allowed: [usize; 2]) -> io::Result<Vec<u32>> {
 }
 
 impl Tile {
-    fn write(&self, bytes: &mut Vec<u8>) {
+    /// Appends everything that was recorded, without loss.
+    pub fn write(&self, bytes: &mut Vec<u8>) {
         for counts in [&self.counts, &self.edge_counts, &self.rejected] {
             put(bytes, counts.iter().copied());
         }
@@ -36,8 +37,9 @@ impl Tile {
         }
     }
 
-    /// Fills an empty tile.
-    fn read(&mut self, statistics: usize, from: &mut impl Read) -> io::Result<()> {
+    /// Fills an empty tile by one of a film that was written when there were so many statistics, if not as many as now.
+    pub fn read(&mut self, statistics: Option<usize>, from: &mut impl Read) -> io::Result<()> {
+        let statistics = statistics.unwrap_or(STATISTICS.len());
         let pixels = self.counts.len();
         self.counts = take(from, [pixels; 2])?;
         self.edge_counts = take(from, [self.edge_counts.len(); 2])?;
@@ -60,16 +62,5 @@ impl Film {
             tile.write(&mut bytes);
             to.write_all(&bytes)
         })
-    }
-
-    /// Fills an empty film of the size, needs and neighbours of the one that was written.
-    pub fn read(self, from: &mut impl Read) -> io::Result<Self> {
-        self.read_statistics(STATISTICS.len(), from)
-    }
-
-    /// The same of a film that was written when there were only so many statistics.
-    pub fn read_statistics(mut self, statistics: usize, from: &mut impl Read) -> io::Result<Self> {
-        self.tiles.iter_mut().try_for_each(|tile| tile.read(statistics, from))?;
-        Ok(self)
     }
 }

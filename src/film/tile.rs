@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::statistic::{Ordinal, STATISTICS, Statistic};
-use super::{Differences, Needs, Neighbours, Rejected, Sample};
+use super::{Differences, Kernel, Needs, Neighbours, Rejected, Sample, TILE};
 
 /// The half-edges of the first pixel of a tile where every pixel has the four of the cross.
 pub(super) const CROSS: Range<usize> = 0..4;
@@ -47,13 +47,32 @@ impl Tile {
         tile
     }
 
+    /// All empty tiles of a film, one by one.
+    pub fn all((width, height): (usize, usize), needs: Needs, kernel: &Kernel) -> impl Iterator<Item = Self> {
+        let corners = (0..height).step_by(TILE).flat_map(move |y| (0..width).step_by(TILE).map(move |x| (x, y)));
+        corners.map(move |(x, y)| {
+            let mut tile = Self::new((x, y), (TILE.min(width - x), TILE.min(height - y)), needs);
+            match kernel {
+                Kernel::Cross => {}
+                Kernel::Pending => tile.set_half_edges(needs, |_| 0),
+                Kernel::Chosen(neighbours) => tile.set_neighbours(needs, neighbours),
+            }
+            tile
+        })
+    }
+
     /// Makes room for the half-edges of these neighbours, in place of those that there were.
     pub(super) fn set_neighbours(&mut self, needs: Needs, neighbours: &Neighbours) {
+        let width = neighbours.size().0;
+        self.set_half_edges(needs, |(x, y)| neighbours.degree(y * width + x));
+    }
+
+    /// Makes room for as many half-edges of every pixel as `degree` says.
+    pub(super) fn set_half_edges(&mut self, needs: Needs, degree: impl Fn((usize, usize)) -> usize) {
         let mut total = 0;
         self.half_edges = vec![0];
         for index in 0..self.counts.len() {
-            let (x, y) = self.pixel(index);
-            total += neighbours.degree(y * neighbours.size().0 + x) as u32;
+            total += degree(self.pixel(index)) as u32;
             self.half_edges.push(total);
         }
         self.edge_counts.fill(0);
@@ -137,7 +156,7 @@ impl Tile {
     }
 
     /// Adds the samples of a tile at the same place as if they had been taken after those here.
-    pub(super) fn merge(&mut self, other: &Self) {
+    pub fn merge(&mut self, other: &Self) {
         for (k, statistic) in STATISTICS.iter().enumerate() {
             let mut mine = std::mem::take(&mut self.planes[k]);
             // A sparse plane that only one of both has is zero in the other.

@@ -331,12 +331,133 @@ fn signalled(folder: &Path, signal: &str, milliseconds: u64, extra: &[&str]) -> 
 
 #[test]
 fn signals_end_a_render_with_an_image_and_a_checkpoint() {
-    for (signal, expected) in [("-INT", 130), ("-TERM", 143), ("-HUP", 129)] {
+    for signal in ["-INT", "-TERM", "-HUP"] {
         let folder = tempfile::tempdir().unwrap();
+        // The code of something that may be tried again.
         let code = signalled(folder.path(), signal, 1000, &["-o", "a.exr", "--time", "60s"]);
-        assert_eq!(code, Some(expected), "{signal}");
+        assert_eq!(code, Some(75), "{signal}");
         let kept = checkpoint::load(&folder.path().join("a.ckpt")).unwrap();
         assert!(kept.outcome.film.samples() > 0 && folder.path().join("a.exr").exists(), "{signal}");
+    }
+}
+
+#[test]
+fn a_checkpoint_may_be_all_that_is_wanted_and_has_one_writer() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = crate::common::root().join("scenes/cornell-box/scene.xml");
+    let render = |extra: &[&str]| {
+        let mut command = std::process::Command::new(assert_cmd::cargo::cargo_bin("fluxion"));
+        command.current_dir(folder.path()).arg("render").arg(&scene).args(["-q", "--size", "64x64"]).args(extra);
+        command
+    };
+    assert!(render(&["--checkpoint", "a.ckpt", "--spp", "3", "--method", "l2"]).status().unwrap().success());
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "no image, no temporary file and no lock");
+    let info = fluxion(folder.path()).args(["info", "a.ckpt"]).output().unwrap();
+    let info = String::from_utf8_lossy(&info.stdout).into_owned();
+    for expected in ["64x64", "l2", "samples      3 from number 0 on, seed 0", "to cross, shifted by reconnect"] {
+        assert!(info.contains(expected), "{info}");
+    }
+    // A twin is turned away, and does not disturb the first, which two requests to terminate do not hurry.
+    let mut first = render(&["--checkpoint", "b.ckpt", "--spp", "100000", "--method", "l2"]).spawn().unwrap();
+    std::thread::sleep(std::time::Duration::from_millis(700));
+    let twin = render(&["--checkpoint", "b.ckpt", "--spp", "4", "--resume"]).output().unwrap();
+    let message = String::from_utf8_lossy(&twin.stderr).into_owned();
+    assert!(twin.status.code() == Some(1) && message.contains(&format!("process {}", first.id())), "{message}");
+    for _ in 0..2 {
+        std::process::Command::new("kill").args(["-TERM", &first.id().to_string()]).status().unwrap();
+        std::thread::sleep(std::time::Duration::from_millis(20));
+    }
+    assert_eq!(first.wait().unwrap().code(), Some(75));
+    assert!(checkpoint::load(&folder.path().join("b.ckpt")).unwrap().outcome.film.samples() > 0);
+    // Without a checkpoint nothing can be resumed.
+    let mut lost = render(&["-o", "a.exr", "--spp", "100000", "--method", "primal"]).spawn().unwrap();
+    std::thread::sleep(std::time::Duration::from_millis(700));
+    std::process::Command::new("kill").args(["-TERM", &lost.id().to_string()]).status().unwrap();
+    assert_eq!(lost.wait().unwrap().code(), Some(143));
+}
+
+#[test]
+fn groups_of_chunks_are_merged_into_the_bits_of_all_chunks() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = crate::common::root().join("scenes/glossy-metal/scene.xml");
+    let run = |arguments: &[&str]| fluxion(folder.path()).args(arguments).assert().success();
+    let name = |k: usize| format!("{k:02}.ckpt");
+    for k in 0..11 {
+        let (first, scene) = ((8 * k).to_string(), scene.display().to_string());
+        let extra = ["--spp", "8", "--first", &first, "--checkpoint", &name(k), "--method", "l2", "--size", "20x17"];
+        run(&[&["render", &scene, "-q"], &extra[..]].concat());
+    }
+    let merge = |output: &str, films: &[String]| {
+        let films: Vec<_> = films.iter().rev().map(String::as_str).collect();
+        run(&[&["merge", "-o", output], &films[..]].concat());
+    };
+    let all: Vec<_> = (0..11).map(name).collect();
+    merge("all.ckpt", &all);
+    merge("a.ckpt", &all[..4]);
+    merge("b.ckpt", &all[4..8]);
+    merge("ab.ckpt", &["a.ckpt".into(), "b.ckpt".into()]);
+    merge("c.ckpt", &all[8..10]);
+    merge("groups.ckpt", &["ab.ckpt".into(), "c.ckpt".into(), all[10].clone()]);
+    let film = |name: &str| checkpoint::load(&folder.path().join(name)).unwrap().outcome.film;
+    assert!(film("all.ckpt") == film("groups.ckpt"));
+    merge("all.exr", &all);
+    let frame = fluxion::exr::load(&folder.path().join("all.exr")).unwrap();
+    for (layer, image) in film("all.ckpt").develop().present() {
+        assert_eq!(frame.get(layer), Some(image), "{}", layer.name());
+    }
+    // One render of all samples, up to rounding.
+    let whole = film_of_all(&bundled("glossy-metal", (20, 17)));
+    for (layer, image) in whole.develop().present() {
+        let merged = frame.get(layer).unwrap();
+        let most = image.data.iter().fold(0.0f32, |most, value| most.max(value.abs()));
+        assert!(image.data.iter().zip(&merged.data).all(|(a, b)| (a - b).abs() <= 1e-5 * most), "{}", layer.name());
+    }
+    // A damaged chunk is named.
+    let path = folder.path().join(&all[3]);
+    let mut bytes = fs::read(&path).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 1;
+    fs::write(&path, bytes).unwrap();
+    let films: Vec<_> = all.iter().map(String::as_str).collect();
+    let error = refused(fluxion(folder.path()).args([&["merge", "-o", "x.ckpt"], &films[..]].concat()));
+    assert!(
+        error.contains("03.ckpt") && error.contains("damaged") && !folder.path().join("x.ckpt").exists(),
+        "{error}"
+    );
+}
+
+fn film_of_all(scene: &Scene) -> Film {
+    let settings = RenderSettings { seed: 0, ..settings(88, reconstruct::parse("l2").unwrap().needs()) };
+    render(scene, settings, &Control::QUIET).film
+}
+
+#[test]
+fn progress_is_told_in_the_words_that_are_asked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = crate::common::root().join("scenes/cornell-box/scene.xml").display().to_string();
+    for (style, out, err) in
+        [("json", "", "\"stage\":\"rendering\""), ("openjd", "openjd_progress: ", ""), ("alf", "ALF_PROGRESS ", "")]
+    {
+        let output = fluxion(folder.path())
+            .args([
+                "render",
+                &scene,
+                "-o",
+                "a.exr",
+                "--size",
+                "64x64",
+                "--time",
+                "3s",
+                "--method",
+                "primal",
+                "--adaptive",
+                "uniform",
+            ])
+            .args(["--progress", style])
+            .output()
+            .unwrap();
+        let [found, noted] = [&output.stdout, &output.stderr].map(|bytes| String::from_utf8_lossy(bytes).into_owned());
+        assert!(output.status.success() && found.contains(out) && noted.contains(err), "{style}: {found} {noted}");
     }
 }
 

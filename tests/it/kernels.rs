@@ -177,13 +177,13 @@ fn renders_that_were_interrupted_choose_the_same_neighbours() {
     let two = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
     assert!(two.install(|| kernel_film(&scene, settings(11))) == straight);
     // A film with other neighbours cannot be added.
-    let mut all = checkpoint::load(&path).unwrap();
+    let other_path = folder.path().join("b.ckpt");
     let other = RenderSettings { seed: 4, ..settings(7) };
     let mut outcome = render(&scene, other, &Control::QUIET);
     outcome.elapsed = Duration::from_secs(1);
-    checkpoint::save(&path, &Origin { runs: vec![Run { seed: 4, first: 0, samples: 0 }], ..origin }, &outcome, None)
-        .unwrap();
-    let refused = all.merge(checkpoint::load(&path).unwrap()).unwrap_err();
+    let origin = Origin { runs: vec![Run { seed: 4, first: 0, samples: 0 }], ..origin };
+    checkpoint::save(&other_path, &origin, &outcome, None).unwrap();
+    let refused = checkpoint::merge(&[path, other_path], &folder.path().join("c.ckpt")).unwrap_err().to_string();
     assert!(refused.contains("other neighbours"), "{refused}");
 }
 

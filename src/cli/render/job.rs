@@ -32,7 +32,8 @@ pub struct Job<'a> {
 /// Everything that is to be written.
 struct Rendered {
     frame: Frame,
-    solution: Solution,
+    /// None if nobody wants the image.
+    solution: Option<Solution>,
     /// The result of saving the layers, whose failure does not lose the image.
     layers: Result<()>,
 }
@@ -45,7 +46,9 @@ impl Job<'_> {
             Some(allocator) => self.adaptive(allocator, start, stats)?,
             None => self.straight(start, stats)?,
         };
-        method::write(&args.method, &args.output, &solution, &frame, stats)?;
+        if let Some(solution) = solution {
+            method::write(&args.method, &args.output, &solution, &frame, stats)?;
+        }
         layers?;
         if let Some(path) = &args.json {
             stats.save(path)?;
@@ -70,10 +73,10 @@ impl Job<'_> {
         let stop = stop_on_signal()?;
         let bar = progress::bar(self.args.quiet);
         bar.set_message("rendering");
-        let report = |share| progress::set(&bar, share);
+        let report = |share| bar.set(share);
         let sink = self.sink.map(|sink| sink as &dyn render::CheckpointSink);
         let done = work(&Control { stop: &stop, progress: &report, sink, samples: None });
-        bar.finish_and_clear();
+        bar.finish();
         done
     }
 
@@ -98,7 +101,8 @@ impl Job<'_> {
         if let Some(writer) = writer {
             layers = layers.and(Ok(writer.finish(&outcome.film, &frame.provenance)?));
         }
-        let solution = args.method.solve(self.method, &frame, args.quiet, stats)?;
+        let wanted = !args.output.is_empty() || args.json.is_some();
+        let solution = wanted.then(|| args.method.solve(self.method, &frame, args.quiet, stats)).transpose()?;
         Ok(Rendered { frame, solution, layers })
     }
 
@@ -131,7 +135,7 @@ impl Job<'_> {
         if let (false, Some(error)) = (args.quiet, stats.passes.last().and_then(|pass| pass.error)) {
             note!("estimated relMSE {error:.2e} after {} passes", stats.passes.len());
         }
-        Ok(Rendered { frame, solution, layers })
+        Ok(Rendered { frame, solution: Some(solution), layers })
     }
 
     /// Saves the layers, if they are asked for.

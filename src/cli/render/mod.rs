@@ -30,8 +30,9 @@ use crate::cli::terminal::{note, out};
 pub struct Args {
     /// Scene file, Mitsuba 3 XML
     scene: PathBuf,
-    /// Image to write, by its extension: exr, hdr, pfm, tiff, png or jpg; may be given several times
-    #[arg(short, long, required_unless_present = "replay", value_name = "FILE")]
+    /// Image to write, by its extension: exr, hdr, pfm, tiff, png or jpg; may be given several times, and left out where a checkpoint
+    /// or samples are all that is wanted
+    #[arg(short, long, required_unless_present_any = ["replay", "checkpoint", "samples"], value_name = "FILE")]
     output: Vec<PathBuf>,
     /// Samples per pixel [default: the scene's own]
     #[arg(long, conflicts_with = "time", value_parser = clap::value_parser!(u32).range(1..))]
@@ -141,6 +142,7 @@ fn parse_sample(text: &str) -> Result<(usize, usize, u32), String> {
 pub fn run(args: &Args) -> Result<ExitCode> {
     super::use_threads(args.threads)?;
     let method = args.method.make()?;
+    let lock = args.checkpoint.lock()?;
     args.checkpoint.check()?;
     let _claims = Claims::new(&args.output, &[&args.layers, &args.json, &args.checkpoint.checkpoint], &[&args.scene])?;
     let mut stats = Stats { method: args.method.method.clone(), ..Stats::default() };
@@ -158,19 +160,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         Shifted::Auto => method.needs(),
     };
     let needed = kernel::needs(needed, &kernel);
-    let saved = match (&args.layers, &args.samples) {
-        (None, Some(_)) => Needs { features: true, ..Needs::default() },
-        (Some(_), _) => Needs {
-            features: true,
-            edges: needed.edges,
-            bins: args.bins,
-            occlusion: args.occlusion,
-            position: args.position,
-            ambient: args.ambient,
-            alpha: false,
-        },
-        (None, None) => Needs::default(),
-    };
+    let saved = saved(args, needed);
     let plan = match args.plan {
         Planned::Needed => Plan::new(&scene, needed, saved),
         Planned::All => {
@@ -189,7 +179,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         Some(checkpoint) => checkpoint.resume(&journal),
         None => Start { render: RenderOutcome::new(&scene, plan.needs), journal: &journal },
     };
-    let sink = origin.and_then(|origin| args.checkpoint.sink(origin, &start));
+    let sink = origin.zip(lock).and_then(|(origin, lock)| args.checkpoint.sink(origin, &start, lock));
     let done = Job { args, scene: &scene, method: method.as_ref(), kernel, sink: sink.as_ref() }.run(start, &mut stats);
     match &sink {
         Some(sink) => sink.conclude(done)?,
@@ -197,6 +187,23 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     }
     report(args, &stats);
     Ok(ExitCode::SUCCESS)
+}
+
+/// Statistics that are to be saved, for a method with these needs.
+fn saved(args: &Args, needed: Needs) -> Needs {
+    match (&args.layers, &args.samples) {
+        (None, None) => Needs::default(),
+        (None, Some(_)) => Needs { features: true, ..Needs::default() },
+        (Some(_), _) => Needs {
+            features: true,
+            edges: needed.edges,
+            bins: args.bins,
+            occlusion: args.occlusion,
+            position: args.position,
+            ambient: args.ambient,
+            alpha: false,
+        },
+    }
 }
 
 /// Origin of the film that is going to be rendered.
