@@ -1,9 +1,9 @@
 """Reconstructions on the cross and on other kernels at equal samples, as the tables of docs/kernels.md.
 
-    python tools/kernels.py SCENES REFERENCES [--depth N] [--spp 16,64] [--seeds 3] [--kernels cross,structure] [--shift reconnect]
+    python tools/kernels.py SCENES REFERENCES [--depth N [--reference 8192]] [--spp 16,64] [--seeds 3] [--kernels cross,structure] [--shift reconnect]
 
 SCENES is a folder with NAME/scene.xml; REFERENCES one with NAME.exr and NAME_var.exr. With a depth other than the scenes' own the
-references are rendered here, by path tracing with 8192 samples of another seed. Errors are means over seeds and geometric means over
+references are rendered here, by path tracing with --reference samples of another seed. Errors are means over seeds and geometric means over
 scenes. Run from the repository's top folder after `cargo build --release`. Needs PyPI openimageio and numpy.
 """
 import argparse
@@ -33,7 +33,7 @@ def reference(args, name, folder):
     width, height = np.stack([exr.everything(path)[c] for c in "RGB"], -1).shape[1::-1]
     if args.depth:
         path = os.path.join(folder, "%s-%d.exr" % (name, args.depth))
-        run("render", scene(args, name), "-o", path, "-q", "--size", "%dx%d" % (width, height), "--spp", 8192, "--seed", 977,
+        run("render", scene(args, name), "-o", path, "-q", "--size", "%dx%d" % (width, height), "--spp", args.reference, "--seed", 977,
             "--method", "primal", "--max-depth", args.depth)
     return path, "%dx%d" % (width, height)
 
@@ -61,6 +61,7 @@ def main():
     parser.add_argument("scenes")
     parser.add_argument("references")
     parser.add_argument("--depth", type=int)
+    parser.add_argument("--reference", type=int, default=8192)
     parser.add_argument("--spp", default="16,64")
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--kernels", default="cross,structure")

@@ -1,7 +1,7 @@
 //! Edges between any pixels as images for files: the mask of every pixel's neighbours, and for every step that is in use a layer
 //! of the differences across it, at the lower end of each edge.
 
-use super::{BINS, Edges, Frame, Layer, STEPS, opposite};
+use super::{BINS, Edges, Frame, Layer, Neighbours, STEPS, opposite};
 use crate::image::Image;
 use crate::math::{Rgb, vec3};
 
@@ -91,16 +91,8 @@ pub fn channels(edges: &Edges) -> Vec<(String, Vec<f32>)> {
 /// pixels there are edges, whichever end says so. Numbers of samples are those of the frame's ends.
 pub fn edges(frame: &Frame, channel: impl Fn(&str) -> Option<Vec<f32>>) -> Option<Edges> {
     let (masks, size) = (channel(MASKS)?, (frame.width, frame.height));
-    let to = |pixel: usize, (dx, dy): (i32, i32)| {
-        let x = (pixel % size.0).checked_add_signed(dx as isize).filter(|&x| x < size.0)?;
-        let y = (pixel / size.0).checked_add_signed(dy as isize).filter(|&y| y < size.1)?;
-        Some(y * size.0 + x)
-    };
-    let pairs = masks.iter().enumerate().flat_map(|(pixel, &mask)| {
-        let chosen = STEPS.into_iter().enumerate().filter(move |(k, _)| mask as u32 & 1 << k != 0);
-        chosen.filter_map(move |(_, step)| Some([pixel, to(pixel, step)?]))
-    });
-    let mut edges = Edges::new(size, pairs);
+    let neighbours = Neighbours::new(size, masks.iter().map(|&mask| mask as u32).collect(), true);
+    let mut edges = Edges::new(size, neighbours.pairs());
     for part in Part::all() {
         let mut values = vec![Rgb::ZERO; edges.len()];
         let mut found = false;

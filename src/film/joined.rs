@@ -20,11 +20,7 @@ impl Film {
     /// directed.
     pub(super) fn joined(&self, neighbours: &Neighbours) -> Edges {
         let size = neighbours.size();
-        let pairs = (0..neighbours.masks().len()).flat_map(|pixel| {
-            let to = move |step| Some([pixel, neighbours.to(pixel, step)?]);
-            neighbours.steps(pixel).filter_map(to)
-        });
-        let sampled = pairs.filter(|ends| self.ends(neighbours, *ends).iter().any(Option::is_some));
+        let sampled = neighbours.pairs().filter(|ends| self.ends(neighbours, *ends).iter().any(Option::is_some));
         let mut edges = Edges::new(size, sampled);
         let all = 0..edges.len();
         let ends = |edge: usize| self.ends(neighbours, edges.ends(edge)).into_iter().flatten();

@@ -124,11 +124,22 @@ impl Neighbours {
 
     /// The pixel that a step leads to, if it belongs to the film.
     pub fn to(&self, pixel: usize, step: usize) -> Option<usize> {
-        let ((width, height), (dx, dy)) = (self.size, STEPS[step]);
-        let x = (pixel % width).checked_add_signed(dx as isize).filter(|&x| x < width)?;
-        let y = (pixel / width).checked_add_signed(dy as isize).filter(|&y| y < height)?;
-        Some(y * width + x)
+        beside(self.size, pixel, step)
     }
+
+    /// All pixels with each of their neighbours.
+    pub fn pairs(&self) -> impl Iterator<Item = [usize; 2]> {
+        let of_pixel = move |pixel| self.steps(pixel).filter_map(move |step| Some([pixel, self.to(pixel, step)?]));
+        (0..self.masks.len()).flat_map(of_pixel)
+    }
+}
+
+/// The pixel that a step leads to from another one, if it belongs to a film of this size.
+pub fn beside((width, height): (usize, usize), pixel: usize, step: usize) -> Option<usize> {
+    let (dx, dy) = STEPS[step];
+    let x = (pixel % width).checked_add_signed(dx as isize).filter(|&x| x < width)?;
+    let y = (pixel / width).checked_add_signed(dy as isize).filter(|&y| y < height)?;
+    Some(y * width + x)
 }
 
 /// Positions of a mask's bits, in ascending order.

@@ -9,7 +9,7 @@
 use rayon::prelude::*;
 
 use super::{KernelKind, Selector};
-use crate::film::{Frame, Layer, Needs, STEPS};
+use crate::film::{EdgeNeed, Frame, Layer, Needs, STEPS, beside};
 use crate::image::Image;
 
 /// `structure`.
@@ -19,7 +19,7 @@ pub const KERNEL: KernelKind = KernelKind {
     k: 4,
     pilot: Some(Needs {
         features: true,
-        edges: crate::film::EdgeNeed::Off,
+        edges: EdgeNeed::Off,
         bins: false,
         occlusion: false,
         position: false,
@@ -62,16 +62,12 @@ fn select(frame: &Frame, selector: &Selector) -> Vec<u32> {
 
 /// The most similar neighbours of a pixel.
 fn choose(frame: &Frame, selector: &Selector, features: &[Feature], pixel: usize) -> u32 {
-    let (x, y) = (pixel % frame.width, pixel / frame.width);
     let mut similar = Vec::with_capacity(STEPS.len());
-    for (step, (dx, dy)) in STEPS.into_iter().enumerate() {
-        let (there_x, there_y) = (x.wrapping_add_signed(dx as isize), y.wrapping_add_signed(dy as isize));
-        if there_x < frame.width && there_y < frame.height {
-            let there = there_y * frame.width + there_x;
-            let similarity = features.iter().map(|feature| feature.similarity(pixel, there)).fold(1.0, f32::min);
-            if similarity >= selector.threshold {
-                similar.push((similarity, step));
-            }
+    for step in 0..STEPS.len() {
+        let Some(there) = beside((frame.width, frame.height), pixel, step) else { continue };
+        let similarity = features.iter().map(|feature| feature.similarity(pixel, there)).fold(1.0, f32::min);
+        if similarity >= selector.threshold {
+            similar.push((similarity, step));
         }
     }
     // Stable, so that of equally similar ones the nearest come first.
