@@ -21,7 +21,7 @@ pub struct Args {
     /// File to save all samples in from time to time, so that an interrupted render can be resumed
     #[arg(long, value_name = "FILE")]
     pub checkpoint: Option<PathBuf>,
-    /// Time between checkpoints; slow ones are written less often, so that they take at most a twentieth of the time
+    /// Time between checkpoints; slow ones are written less often, so that they take at most a hundredth of the time
     #[arg(long, default_value = "60s", value_parser = super::parse_time, requires = "checkpoint", value_name = "TIME")]
     checkpoint_every: Duration,
     /// Resume from the checkpoint, if it exists
@@ -30,7 +30,7 @@ pub struct Args {
 }
 
 /// Share of the time, inverted, that writing checkpoints may take.
-const SHARE: u32 = 20;
+const SHARE: u32 = 100;
 
 impl Args {
     /// Fails if there is a checkpoint that is not to be resumed. To be called before the file is claimed.

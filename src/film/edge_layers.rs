@@ -60,13 +60,16 @@ impl Part {
     }
 }
 
-/// Channels of a frame's own edges, by name, each with the values of all pixels.
-pub fn channels(edges: &Edges) -> Vec<(String, Vec<f32>)> {
+/// Channels of a frame's own edges, by name, each with the values of all pixels. Weights that come with the edges are left out. The
+/// error says which edges are too long.
+pub fn channels(edges: &Edges) -> Result<Vec<(String, Vec<f32>)>, String> {
     let pixels = edges.pixels();
     let mut masks = vec![0u32; pixels];
     let mut channels = Vec::new();
     for (kind, &offset) in edges.offsets().iter().enumerate() {
-        let Some(step) = STEPS.iter().position(|step| *step == offset) else { continue };
+        let Some(step) = STEPS.iter().position(|step| *step == offset) else {
+            return Err(format!("files hold edges within windows of 5x5 pixels, and there is one across {offset:?}"));
+        };
         let of_kind: Vec<_> = (0..edges.len()).filter(|&edge| edges.kind(edge) == kind).collect();
         for &edge in &of_kind {
             let [lower, higher] = edges.ends(edge);
@@ -84,7 +87,7 @@ pub fn channels(edges: &Edges) -> Vec<(String, Vec<f32>)> {
         }
     }
     channels.push((MASKS.to_owned(), masks.iter().map(|&mask| mask as f32).collect()));
-    channels
+    Ok(channels)
 }
 
 /// Edges from the channels of a file, if it has masks of neighbours. `channel` finds one by its name. Masks say between which

@@ -10,7 +10,8 @@ use crate::image::io::{Kind, Pixels, read, write};
 /// Writes every layer of a frame, without loss.
 pub fn save(path: &Path, frame: &Frame) -> Result<()> {
     let present: Vec<_> = frame.present().collect();
-    let own_edges = frame.own_edges().map_or_else(Vec::new, edge_layers::channels);
+    let own_edges = frame.own_edges().map(edge_layers::channels).transpose().map_err(|why| Error::io(path, why))?;
+    let own_edges = own_edges.unwrap_or_default();
     let of_layers = present.iter().flat_map(|(layer, _)| layer.channel_names());
     let channels: Vec<String> = of_layers.chain(own_edges.iter().map(|(name, _)| name.clone())).collect();
     let mut data = Vec::with_capacity(frame.width * frame.height * channels.len());

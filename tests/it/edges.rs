@@ -122,6 +122,13 @@ fn edges_survive_files_to_the_bit() {
     (expected.weights, expected.counts) = (Vec::new(), vec![samples; expected.len()]);
     written.set_edges(expected);
     assert!(read.own_edges() == written.own_edges());
+    // Edges that files have no room for are not lost silently.
+    let mut long = exact(&picture(SIZE));
+    let mut edge = Edges::new(SIZE, [[0, 3]]);
+    edge.mean = vec![Rgb::ZERO];
+    long.set_edges(edge);
+    let message = fluxion::exr::save(&path, &long).unwrap_err().to_string();
+    assert!(message.contains("a.exr") && message.contains("windows of 5x5"), "{message}");
     // Values that cannot be are refused.
     let mut wrong = written.own_edges().unwrap().clone();
     wrong.variance[7].y = -1.0;
