@@ -46,6 +46,11 @@ pub fn summary(path: &Path) -> Result<Summary> {
     Ok(Summary { origin: header.origin, seconds, adaptive, rejected })
 }
 
+/// Reads a checkpoint from end to end. The error says how it is damaged.
+pub fn verify(path: &Path) -> Result<()> {
+    header::Reader::open(path, 1 << 20)?.finish()
+}
+
 impl Checkpoint {
     /// The render so far, to be resumed.
     pub fn resume(self, journal: &Mutex<Journal>) -> adaptive::Start<'_> {

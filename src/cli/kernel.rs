@@ -20,6 +20,18 @@ pub struct Args {
 }
 
 impl Args {
+    /// Fails if films of different samples would choose neighbours of their own, so that they could not be merged.
+    pub fn check_merging(&self) -> Result<()> {
+        match Selector::parse(&self.kernel, self.pilot)?.pilot() {
+            0 => Ok(()),
+            _ => Err(Error::Usage(format!(
+                "chunks cannot choose neighbours by pilots of their own: not --kernel {}",
+                self.kernel
+            ))
+            .into()),
+        }
+    }
+
     /// The neighbours for a method and for films of so many samples, if that is known. The error says which methods take them.
     pub fn make(&self, method: &dyn Reconstruction, spp: Option<u32>) -> Result<Selector> {
         let selector = Selector::parse(&self.kernel, self.pilot)?;

@@ -6,6 +6,7 @@ mod compare;
 mod dataset;
 mod info;
 mod interrupt;
+mod job;
 mod kernel;
 mod merge;
 mod method;
@@ -22,6 +23,7 @@ pub mod terminal;
 mod validate;
 
 use std::process::ExitCode;
+use std::sync::Once;
 use std::time::Duration;
 
 use anyhow::Result;
@@ -52,6 +54,8 @@ enum Command {
     Reference(reference::Args),
     /// Render training data for denoisers: inputs of several sample counts and targets, of many scenes
     Dataset(dataset::Args),
+    /// Render in chunks on many machines, by a folder and a command for each
+    Job(job::Args),
     /// Add up the samples of checkpoints, from other machines or seeds
     Merge(merge::Args),
     /// Show what a scene holds and needs, or what Fluxion knows
@@ -73,6 +77,7 @@ pub fn run(args: Args) -> Result<ExitCode> {
         Command::Bench(args) => bench::run(&args),
         Command::Reference(args) => reference::run(&args),
         Command::Dataset(args) => dataset::run(&args),
+        Command::Job(args) => job::run(&args),
         Command::Merge(args) => merge::run(&args),
         Command::Info(args) => info::run(&args),
         Command::Stress(args) => stress::run(&args),
@@ -121,7 +126,10 @@ fn parse_definition(text: &str) -> Result<(String, String), String> {
     Ok((name.to_owned(), value.to_owned()))
 }
 
-/// Makes all parallel work use this many threads (0: one per core).
+/// Makes all parallel work use this many threads (0: one per core). A command that is made of others keeps those of the first.
 fn use_threads(threads: usize) -> Result<()> {
-    Ok(rayon::ThreadPoolBuilder::new().num_threads(threads).build_global()?)
+    static MADE: Once = Once::new();
+    let mut made = Ok(());
+    MADE.call_once(|| made = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global());
+    Ok(made?)
 }

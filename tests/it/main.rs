@@ -15,6 +15,7 @@ mod film;
 mod frgr;
 mod gradient;
 mod interruption;
+mod job;
 mod kernels;
 mod learned;
 mod lights;

@@ -109,6 +109,13 @@ pub struct Args {
     quiet: bool,
 }
 
+impl Args {
+    /// Fails if films that are rendered so with different samples cannot be merged.
+    pub fn check_merging(&self) -> Result<()> {
+        self.kernel.check_merging()
+    }
+}
+
 /// Extent of the plan.
 #[derive(Clone, Copy, clap::ValueEnum)]
 enum Planned {

@@ -1,0 +1,52 @@
+//! `fluxion job`: a render in chunks for many machines. A folder is the only state: `job.json`, the plan, and a checkpoint for each
+//! chunk, `0003.ckpt` when it is complete and `0003.part.ckpt` before.
+//!
+//! ```text
+//! plan --job.json--> run 0, 1, 2, ... (on any machine) --checkpoints--> status, merge --> images
+//! ```
+
+mod chunk;
+mod merge;
+mod plan;
+mod run;
+mod status;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::Result;
+use clap::Subcommand;
+
+/// Options of `job`.
+#[derive(clap::Args)]
+pub struct Args {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Divide renders into chunks: job.json, and commands.txt with a command for each
+    Plan(plan::Args),
+    /// Render a chunk, unless it is complete; go on with it if it was interrupted
+    Run {
+        /// Folder of the job
+        job: PathBuf,
+        /// Number of the chunk, from 0 on
+        chunk: usize,
+    },
+    /// Say which chunks are complete
+    Status(status::Args),
+    /// Add up the chunks of every scene, and make its image
+    Merge(merge::Args),
+}
+
+/// Carries out a command.
+pub fn run(args: &Args) -> Result<ExitCode> {
+    match &args.command {
+        Command::Plan(args) => plan::run(args),
+        Command::Run { job, chunk } => run::run(job, *chunk),
+        Command::Status(args) => status::run(args),
+        Command::Merge(args) => merge::run(args),
+    }
+}

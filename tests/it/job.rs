@@ -1,0 +1,143 @@
+//! Renders in chunks: idempotent commands, a folder as the only state, and the image of one render.
+
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+use std::time::Duration;
+
+use fluxion::checkpoint;
+use fluxion::film::Frame;
+
+use crate::common::root;
+
+fn fluxion(folder: &Path, arguments: &[&str]) -> (Option<i32>, String) {
+    let mut command = Command::new(assert_cmd::cargo::cargo_bin("fluxion"));
+    let output = command.current_dir(folder).args(arguments).output().unwrap();
+    let text = [&output.stdout, &output.stderr].map(|bytes| String::from_utf8_lossy(bytes).into_owned()).concat();
+    (output.status.code(), text)
+}
+
+fn expect(folder: &Path, arguments: &[&str], code: i32, part: &str) {
+    let (found, text) = fluxion(folder, arguments);
+    assert!(found == Some(code) && text.contains(part), "{arguments:?} ended with {found:?}: {text}");
+}
+
+fn scene(name: &str) -> String {
+    root().join("scenes").join(name).join("scene.xml").display().to_string()
+}
+
+fn developed(path: &Path) -> Frame {
+    checkpoint::load(path).unwrap().develop()
+}
+
+#[test]
+fn chunks_make_the_image_of_one_render() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let (cornell, metal) = (scene("cornell-box"), scene("glossy-metal"));
+    let options = ["--size", "33x18", "--method", "l2", "-q"];
+    expect(
+        at,
+        &[&["job", "plan", &cornell, &metal, "--spp", "44", "--chunks", "4", "-o", "j", "--"], &options[..]].concat(),
+        0,
+        "8 chunks",
+    );
+    expect(at, &["job", "plan", &cornell, "--spp", "8", "-o", "j"], 2, "has a job already");
+    expect(at, &["job", "status", "j", "--missing"], 0, "0-7");
+    expect(at, &["job", "merge", "j"], 2, "chunks 0-3 of cornell-box are not complete");
+    // The list of commands, by a shell that finds the program.
+    let program = assert_cmd::cargo::cargo_bin("fluxion");
+    let path = format!("{}:{}", program.parent().unwrap().display(), std::env::var("PATH").unwrap());
+    let commands = fs::read_to_string(at.join("j/commands.txt")).unwrap();
+    let lines: Vec<_> = commands.lines().collect();
+    assert_eq!(lines.len(), 8);
+    for line in &lines[..7] {
+        assert!(Command::new("sh").args(["-c", line]).env("PATH", &path).status().unwrap().success(), "{line}");
+    }
+    expect(at, &["job", "run", "j", "2"], 0, "chunk 2 is complete");
+    expect(at, &["job", "run", "j", "8"], 2, "there are 8, from 0 on");
+    expect(at, &["job", "status", "j"], 0, "missing: 7");
+    expect(at, &["job", "merge", "j", "--no-image"], 2, "chunks 7 of glossy-metal");
+    expect(at, &["job", "merge", "j", "--partial"], 0, "3 chunks");
+    expect(at, &["job", "run", "j", "7"], 0, "");
+    expect(at, &["job", "merge", "j"], 0, "glossy-metal.exr");
+    for (name, scene) in [("cornell-box", &cornell), ("glossy-metal", &metal)] {
+        let all = ["render", scene, "--spp", "44", "--checkpoint", "all.ckpt"];
+        expect(at, &[&all[..], &options[..]].concat(), 0, "");
+        let (merged, whole) = (developed(&at.join(format!("j/{name}.ckpt"))), developed(&at.join("all.ckpt")));
+        for (layer, image) in whole.present() {
+            let most = image.data.iter().fold(0.0f32, |most, value| most.max(value.abs()));
+            let close = |(a, b): (&f32, &f32)| (a - b).abs() <= 1e-5 * most;
+            assert!(merged.get(layer).unwrap().data.iter().zip(&image.data).all(close), "{name}: {}", layer.name());
+        }
+        assert!(at.join(format!("j/{name}.exr")).exists());
+        fs::remove_file(at.join("all.ckpt")).unwrap();
+    }
+    // The same bits by groups.
+    let chunk = |k: usize| format!("j/{k:04}.ckpt");
+    for k in [0, 2] {
+        expect(at, &["merge", &chunk(k), &chunk(k + 1), "-o", &format!("{k}.ckpt")], 0, "2 runs");
+    }
+    expect(at, &["merge", "2.ckpt", "0.ckpt", "-o", "groups.ckpt"], 0, "4 runs");
+    let film = |path: &str| checkpoint::load(&at.join(path)).unwrap().outcome.film;
+    assert!(film("groups.ckpt") == film("j/cornell-box.ckpt"));
+}
+
+#[test]
+fn chunks_that_are_stopped_killed_damaged_or_foreign_are_told_and_healed() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let cornell = scene("cornell-box");
+    let plan = ["job", "plan", &cornell, "--spp", "4000", "--chunks", "2", "-o", "j", "--"];
+    let options = ["--size", "24x18", "--method", "l2", "-q", "--checkpoint-every", "0.02s"];
+    expect(at, &[&plan[..], &options[..]].concat(), 0, "2 chunks");
+    for (signal, expected) in [("-TERM", Some(75)), ("-KILL", None), ("-TERM", Some(75))] {
+        let mut command = Command::new(assert_cmd::cargo::cargo_bin("fluxion"));
+        let mut child = command.current_dir(at).args(["job", "run", "j", "0"]).spawn().unwrap();
+        std::thread::sleep(Duration::from_millis(300));
+        Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap();
+        let code = child.wait().unwrap().code();
+        assert!(code == expected || code == Some(0), "{signal}: {code:?}");
+    }
+    expect(at, &["job", "run", "j", "0"], 0, "");
+    expect(at, &["job", "run", "j", "1"], 0, "");
+    expect(at, &["job", "status", "j", "--json"], 0, "\"complete\": 2");
+    let (zero, one) = (at.join("j/0000.ckpt"), at.join("j/0001.ckpt"));
+    let kept = fs::read(&one).unwrap();
+    // A copy of another chunk, half a file, and a flipped bit, which only its bytes tell.
+    fs::copy(&zero, &one).unwrap();
+    expect(at, &["job", "status", "j"], 0, "damaged or foreign: 1");
+    expect(at, &["job", "run", "j", "1"], 1, "0001.ckpt: is no checkpoint of this chunk");
+    fs::write(&one, &kept[..200]).unwrap();
+    expect(at, &["job", "status", "j", "--missing"], 0, "1\n");
+    let mut flipped = kept.clone();
+    flipped[kept.len() - 100] ^= 4;
+    fs::write(&one, &flipped).unwrap();
+    expect(at, &["job", "status", "j", "--verify"], 0, "damaged or foreign: 1");
+    expect(at, &["job", "merge", "j"], 1, "0001.ckpt: is damaged");
+    fs::remove_file(&one).unwrap();
+    expect(at, &["job", "run", "j", "1"], 0, "");
+    let film = |path: &Path| checkpoint::load(path).unwrap().outcome.film;
+    fs::write(at.join("kept.ckpt"), &kept).unwrap();
+    assert!(film(&one) == film(&at.join("kept.ckpt")));
+}
+
+#[test]
+fn plans_that_cannot_be_carried_out_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let cornell = scene("cornell-box");
+    for (extra, expected) in [
+        (&["--spp", "16", "--chunks", "3"][..], "at most 2 chunks of eight"),
+        (&["--spp", "16", "--", "--no-such-option"], "--no-such-option"),
+        (&["--spp", "16", "--", "--spp", "4"], "--spp"),
+        (&["--spp", "16", "--", "--method", "l2", "--kernel", "structure"], "pilots of their own"),
+        (&["--spp", "16", "--chunks", "0"], "--chunks"),
+    ] {
+        expect(at, &[&["job", "plan", &cornell, "-o", "j"], extra].concat(), 2, expected);
+    }
+    expect(at, &["job", "plan", &cornell, &cornell, "--spp", "8", "-o", "j"], 2, "two scenes are called cornell-box");
+    expect(at, &["job", "plan", "nowhere.xml", "--spp", "8", "-o", "j"], 1, "nowhere.xml");
+    expect(at, &["job", "status", "j"], 1, "job.json");
+    assert!(!at.join("j/job.json").exists());
+}
