@@ -2,7 +2,6 @@
 
 use anyhow::Result;
 use fluxion::error::Error;
-use fluxion::film::Needs;
 use fluxion::neighbours::{PILOT, Selector};
 use fluxion::reconstruct::{self, METHODS, Method, Reconstruction};
 
@@ -58,9 +57,4 @@ impl Args {
         }
         Ok(selector)
     }
-}
-
-/// Statistics that have to be recorded for a method and for the choice of its neighbours.
-pub fn needs(method: Needs, selector: &Selector) -> Needs {
-    method.union(selector.needs())
 }

@@ -166,7 +166,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         Shifted::Always => method.needs().with_every_difference(),
         Shifted::Auto => method.needs(),
     };
-    let needed = kernel::needs(needed, &kernel);
+    let needed = needed.union(kernel.needs());
     let saved = saved(args, needed);
     let plan = match args.plan {
         Planned::Needed => Plan::new(&scene, needed, saved),
