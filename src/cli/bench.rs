@@ -93,7 +93,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             done += 1;
         };
         let runs = Runs { methods: &methods, budgets: &budgets, seeds: args.seeds };
-        runs.on(&case, &mut store, &stop, &mut report)?;
+        runs.on(&case, &mut store, stop, &mut report)?;
         if stop.load(Ordering::Relaxed) {
             break;
         }

@@ -163,7 +163,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         report(0.0);
         let scene = super::scene::load(&args.scenes[k], &args.options.options())?;
         let frame = (folder.as_path(), names[k].as_str());
-        if !dataset::make((&scene, &args.scenes[k]), frame, &recipe, &stop, &report)? {
+        if !dataset::make((&scene, &args.scenes[k]), frame, &recipe, stop, &report)? {
             break;
         }
         there += 1;

@@ -1,7 +1,7 @@
 //! Signals that ask a long command to stop.
 
 use std::process::ExitCode;
-use std::sync::Arc;
+use std::sync::Once;
 use std::sync::atomic::{AtomicBool, AtomicI32, Ordering};
 
 use anyhow::Result;
@@ -22,15 +22,20 @@ const RESUMABLE: u8 = 75;
 /// Exit codes of programs that a signal ended, less the signal's number.
 const SIGNALLED: i32 = 128;
 
-/// A flag that the first signal sets. A second Ctrl-C ends the program; a second request to terminate does not, since
-/// schedulers send several.
-pub fn stop_on_signal() -> Result<Arc<AtomicBool>> {
-    let stop = Arc::new(AtomicBool::new(false));
-    let flag = Arc::clone(&stop);
+/// The flag that the first signal sets.
+static STOP: AtomicBool = AtomicBool::new(false);
+
+/// Listens to signals from the first call on. The first one sets the flag. A second Ctrl-C ends the program; a second request to
+/// terminate does not, since schedulers send several.
+pub fn stop_on_signal() -> Result<&'static AtomicBool> {
+    static LISTENING: Once = Once::new();
+    if LISTENING.is_completed() {
+        return Ok(&STOP);
+    }
     let mut signals = Signals::new([SIGINT, SIGTERM, SIGHUP])?;
     std::thread::Builder::new().name("signals".into()).spawn(move || {
         for signal in signals.forever() {
-            if flag.swap(true, Ordering::Relaxed) {
+            if STOP.swap(true, Ordering::Relaxed) {
                 if signal == SIGINT {
                     std::process::exit(SIGNALLED + SIGINT);
                 }
@@ -40,7 +45,8 @@ pub fn stop_on_signal() -> Result<Arc<AtomicBool>> {
             note!("\nstopping after the running tiles; once more Ctrl-C ends at once");
         }
     })?;
-    Ok(stop)
+    LISTENING.call_once(|| ());
+    Ok(&STOP)
 }
 
 /// The exit code of a command that was stopped by a signal: [`RESUMABLE`] if everything was saved.

@@ -74,7 +74,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     while let Some(spp) = next_wave(args, &reference) {
         bar.set_message(&format!("{} spp, floor {:.1e}, next wave", reference.spp, reference.floor()));
         let report = |share| bar.set(share);
-        if !reference.add_wave(&scene, spp / 2, &Control { stop: &stop, progress: &report, ..Control::QUIET })? {
+        if !reference.add_wave(&scene, spp / 2, &Control { stop, progress: &report, ..Control::QUIET })? {
             break;
         }
         reference.save(&args.output, args.half)?;

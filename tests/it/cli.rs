@@ -244,8 +244,7 @@ fn an_interrupt_ends_after_the_running_tiles_and_writes_what_is_there() {
         .spawn()
         .unwrap();
     let mut child = Child(child);
-    std::thread::sleep(std::time::Duration::from_millis(1500));
-    std::process::Command::new("sh").args(["-c", &format!("kill -INT {}", child.0.id())]).status().unwrap();
+    crate::common::signal(&child.0, "-INT", std::time::Duration::from_millis(1000));
     assert_eq!(child.0.wait().unwrap().code(), Some(130));
     let image = read_color(&folder.path().join("a.exr")).unwrap();
     assert!(image.data.iter().sum::<f32>() > 0.0);

@@ -4,8 +4,9 @@ use std::fs;
 use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::time::Duration;
 
-use crate::common::{bundled, film};
+use crate::common::{self, bundled, film};
 use assert_cmd::Command;
 use fluxion::adaptive::{self, ALLOCATORS, AdaptiveSettings, Limits, Start};
 use fluxion::checkpoint::{self, Origin, Run};
@@ -200,7 +201,7 @@ fn refused(command: &mut Command) -> String {
 /// A scene of its own folder, with a mesh.
 fn scene_with_mesh(folder: &Path) {
     let body = r#"<emitter type="constant"/><shape type="obj"><string name="filename" value="a.obj"/></shape>"#;
-    let text = format!("<scene version=\"3.0.0\">{body}{}</scene>", crate::common::sensor("0,0,4", 20, 18));
+    let text = format!("<scene version=\"3.0.0\">{body}{}</scene>", common::sensor("0,0,4", 20, 18));
     fs::write(folder.join("scene.xml"), text).unwrap();
     fs::write(folder.join("a.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
 }
@@ -319,13 +320,12 @@ fn what_cannot_be_written_is_an_error_that_says_what_is_kept() {
 fn signalled(folder: &Path, signal: &str, milliseconds: u64, extra: &[&str]) -> Option<i32> {
     let mut child = std::process::Command::new(assert_cmd::cargo::cargo_bin("fluxion"))
         .current_dir(folder)
-        .args(["render", &crate::common::root().join("scenes/cornell-box/scene.xml").display().to_string(), "-q"])
+        .args(["render", &common::root().join("scenes/cornell-box/scene.xml").display().to_string(), "-q"])
         .args(["--size", "64x64", "--checkpoint", "a.ckpt", "--checkpoint-every", "0.02s"])
         .args(extra)
         .spawn()
         .unwrap();
-    std::thread::sleep(std::time::Duration::from_millis(milliseconds));
-    std::process::Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap();
+    common::signal(&child, signal, Duration::from_millis(milliseconds));
     child.wait().unwrap().code()
 }
 
@@ -344,7 +344,7 @@ fn signals_end_a_render_with_an_image_and_a_checkpoint() {
 #[test]
 fn a_checkpoint_may_be_all_that_is_wanted_and_has_one_writer() {
     let folder = tempfile::tempdir().unwrap();
-    let scene = crate::common::root().join("scenes/cornell-box/scene.xml");
+    let scene = common::root().join("scenes/cornell-box/scene.xml");
     let render = |extra: &[&str]| {
         let mut command = std::process::Command::new(assert_cmd::cargo::cargo_bin("fluxion"));
         command.current_dir(folder.path()).arg("render").arg(&scene).args(["-q", "--size", "64x64"]).args(extra);
@@ -359,27 +359,25 @@ fn a_checkpoint_may_be_all_that_is_wanted_and_has_one_writer() {
     }
     // A twin is turned away, and does not disturb the first, which two requests to terminate do not hurry.
     let mut first = render(&["--checkpoint", "b.ckpt", "--spp", "100000", "--method", "l2"]).spawn().unwrap();
-    std::thread::sleep(std::time::Duration::from_millis(700));
+    common::wait_until_it_listens(&first);
     let twin = render(&["--checkpoint", "b.ckpt", "--spp", "4", "--resume"]).output().unwrap();
     let message = String::from_utf8_lossy(&twin.stderr).into_owned();
     assert!(twin.status.code() == Some(1) && message.contains(&format!("process {}", first.id())), "{message}");
     for _ in 0..2 {
-        std::process::Command::new("kill").args(["-TERM", &first.id().to_string()]).status().unwrap();
-        std::thread::sleep(std::time::Duration::from_millis(20));
+        common::signal(&first, "-TERM", Duration::from_millis(20));
     }
     assert_eq!(first.wait().unwrap().code(), Some(75));
     assert!(checkpoint::load(&folder.path().join("b.ckpt")).unwrap().outcome.film.samples() > 0);
     // Without a checkpoint nothing can be resumed.
     let mut lost = render(&["-o", "a.exr", "--spp", "100000", "--method", "primal"]).spawn().unwrap();
-    std::thread::sleep(std::time::Duration::from_millis(700));
-    std::process::Command::new("kill").args(["-TERM", &lost.id().to_string()]).status().unwrap();
+    common::signal(&lost, "-TERM", Duration::from_millis(200));
     assert_eq!(lost.wait().unwrap().code(), Some(143));
 }
 
 #[test]
 fn groups_of_chunks_are_merged_into_the_bits_of_all_chunks() {
     let folder = tempfile::tempdir().unwrap();
-    let scene = crate::common::root().join("scenes/glossy-metal/scene.xml");
+    let scene = common::root().join("scenes/glossy-metal/scene.xml");
     let run = |arguments: &[&str]| fluxion(folder.path()).args(arguments).assert().success();
     let name = |k: usize| format!("{k:02}.ckpt");
     for k in 0..11 {
@@ -434,7 +432,7 @@ fn film_of_all(scene: &Scene) -> Film {
 #[test]
 fn progress_is_told_in_the_words_that_are_asked_for() {
     let folder = tempfile::tempdir().unwrap();
-    let scene = crate::common::root().join("scenes/cornell-box/scene.xml").display().to_string();
+    let scene = common::root().join("scenes/cornell-box/scene.xml").display().to_string();
     for (style, out, err) in
         [("json", "", "\"stage\":\"rendering\""), ("openjd", "openjd_progress: ", ""), ("alf", "ALF_PROGRESS ", "")]
     {
@@ -500,7 +498,7 @@ fn textures_that_vanish_while_rendering_are_reported() {
         r#"<emitter type="constant"/><shape type="rectangle"><bsdf type="diffuse"><texture type="bitmap" name="reflectance">
         <string name="filename" value="{}"/></texture></bsdf></shape>{}"#,
         texture.display(),
-        crate::common::sensor("0,0,4", 16, 16)
+        common::sensor("0,0,4", 16, 16)
     );
     let text = format!("<scene version=\"3.0.0\">{body}</scene>");
     let options = fluxion::scene::load::Options { texture_memory: 0, ..Default::default() };

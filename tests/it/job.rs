@@ -8,7 +8,7 @@ use std::time::Duration;
 use fluxion::checkpoint;
 use fluxion::film::Frame;
 
-use crate::common::root;
+use crate::common::{self, root};
 
 fn fluxion(folder: &Path, arguments: &[&str]) -> (Option<i32>, String) {
     let mut command = Command::new(assert_cmd::cargo::cargo_bin("fluxion"));
@@ -94,8 +94,7 @@ fn chunks_that_are_stopped_killed_damaged_or_foreign_are_told_and_healed() {
     for (signal, expected) in [("-TERM", Some(75)), ("-KILL", None), ("-TERM", Some(75))] {
         let mut command = Command::new(assert_cmd::cargo::cargo_bin("fluxion"));
         let mut child = command.current_dir(at).args(["job", "run", "j", "0"]).spawn().unwrap();
-        std::thread::sleep(Duration::from_millis(300));
-        Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap();
+        common::signal(&child, signal, Duration::from_millis(200));
         let code = child.wait().unwrap().code();
         assert!(code == expected || code == Some(0), "{signal}: {code:?}");
     }

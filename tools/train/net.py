@@ -14,13 +14,13 @@ import os
 import numpy as np
 import torch
 from safetensors.torch import load_file, save_file
-from torch import nn
 from torch.nn import functional as F
 
 import frames
 import residual
 import runs
 from frames import planes
+from unet import UNet
 
 # Images that are mixed, and the sampled colours, which are only looked at.
 IMAGES = ["frgr", "frgr_denoised", "frgr_level0_enhanced", ""]
@@ -29,7 +29,7 @@ TOP = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..")
 WEIGHTS = os.path.join(TOP, "src/reconstruct/net/net.safetensors")
 # Channels of the levels on the way down and up again.
 DOWN, UP = [24, 32, 40, 48, 64], [48, 40, 32, 32]
-INPUTS, OUTPUTS, SLOPE = 19, MIXED + 3, 0.01
+INPUTS, OUTPUTS = 19, MIXED + 3
 # Luminance below which differences count as absolute, in units of the typical luminance.
 DARK = 0.1
 # Radius of the window of frgr's image whose values bound the result, room beyond them, over its luminance, and number of samples
@@ -41,32 +41,15 @@ CROP, BATCH, RATE, STEPS = 96, 4, 1e-3, 16000
 EPSILON, FLOOR = 0.03, 1e-4
 
 
-class Network(nn.Module):
+class Network(UNet):
+    """At first it leaves the image of frgr as it is."""
+
     def __init__(self):
-        super().__init__()
-        convolution = lambda i, o: nn.Conv2d(i, o, 3, padding=1)
-        self.first = convolution(INPUTS, DOWN[0])
-        self.down = nn.ModuleList([convolution(i, o) for i, o in zip(DOWN[:1] + DOWN, DOWN)])
-        self.middle = convolution(DOWN[-1], DOWN[-1])
-        below = [DOWN[-1]] + UP
-        self.up = nn.ModuleList([convolution(b + s, o) for b, s, o in zip(below, DOWN[-2::-1], UP)])
-        self.last = convolution(UP[-1], UP[-1])
-        self.out = nn.Conv2d(UP[-1], OUTPUTS, 1)
+        super().__init__(INPUTS, OUTPUTS, DOWN, UP)
         with torch.no_grad():
             self.out.weight.zero_()
             self.out.bias.zero_()
             self.out.bias[0] = START
-
-    def forward(self, x):
-        act = lambda x: F.leaky_relu(x, SLOPE)
-        x, skips = act(self.first(x)), []
-        for level, layer in enumerate(self.down):
-            x = act(layer(x if level == 0 else F.max_pool2d(x, 2)))
-            skips.append(x)
-        x = act(self.middle(skips.pop()))
-        for layer in self.up:
-            x = act(layer(torch.cat([F.interpolate(x, scale_factor=2, mode="nearest"), skips.pop()], 1)))
-        return self.out(act(self.last(x)))
 
 
 def extreme(image, largest):

@@ -75,7 +75,7 @@ impl Job<'_> {
         bar.set_message("rendering");
         let report = |share| bar.set(share);
         let sink = self.sink.map(|sink| sink as &dyn render::CheckpointSink);
-        let done = work(&Control { stop: &stop, progress: &report, sink, samples: None });
+        let done = work(&Control { stop, progress: &report, sink, samples: None });
         bar.finish();
         done
     }

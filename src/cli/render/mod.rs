@@ -23,6 +23,7 @@ use self::job::Job;
 use super::outputs::Claims;
 use super::stats::Stats;
 use super::{checkpoint, kernel, method, progress, stats};
+use crate::cli::interrupt::stop_on_signal;
 use crate::cli::terminal::{note, out};
 
 /// Options of `render`.
@@ -151,6 +152,10 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let method = args.method.make()?;
     let lock = args.checkpoint.lock()?;
     args.checkpoint.check()?;
+    if args.checkpoint.checkpoint.is_some() {
+        // While the scene is read, too: what is to be resumed must not look as if it had failed.
+        stop_on_signal()?;
+    }
     let _claims = Claims::new(&args.output, &[&args.layers, &args.json, &args.checkpoint.checkpoint], &[&args.scene])?;
     let mut stats = Stats { method: args.method.method.clone(), ..Stats::default() };
     let start = Instant::now();

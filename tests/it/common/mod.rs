@@ -3,6 +3,8 @@
 pub mod frames;
 
 use std::path::PathBuf;
+use std::process::{Child, Command};
+use std::time::Duration;
 
 use fluxion::film::{Film, Needs};
 use fluxion::render::{Budget, Control, RenderSettings, Shift, render};
@@ -40,6 +42,26 @@ pub fn sensor(origin: &str, width: usize, height: usize) -> String {
         <film type="hdrfilm"><integer name="width" value="{width}"/><integer name="height" value="{height}"/></film>
         </sensor>"#
     )
+}
+
+/// Waits until a program listens to signals, however slow the machine, or has ended.
+pub fn wait_until_it_listens(child: &Child) {
+    let listens = || {
+        let status = std::fs::read_to_string(format!("/proc/{}/status", child.id())).unwrap();
+        let caught = status.lines().find_map(|line| line.strip_prefix("SigCgt:")).map(str::trim).unwrap_or_default();
+        // The bit of a request to terminate, which is signal 15.
+        status.contains("zombie") || u64::from_str_radix(caught, 16).unwrap() >> 14 & 1 == 1
+    };
+    while !listens() {
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
+/// Sends a running program a signal, some time after it has begun to listen to them.
+pub fn signal(child: &Child, signal: &str, after: Duration) {
+    wait_until_it_listens(child);
+    std::thread::sleep(after);
+    Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap();
 }
 
 /// Renders some samples of every pixel.
