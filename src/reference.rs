@@ -38,6 +38,8 @@ pub struct Reference {
     pub spp: u32,
     /// Seed of the first half.
     pub seed: u64,
+    /// Seeds of the references that were added.
+    pub added: Vec<u64>,
     /// Seconds it took to render.
     pub seconds: f64,
     /// The scene's, in hexadecimal.
@@ -54,6 +56,7 @@ impl Reference {
             difference: black,
             spp: 0,
             seed,
+            added: Vec::new(),
             seconds: 0.0,
             fingerprint: fingerprint(scene),
         }
@@ -89,22 +92,56 @@ impl Reference {
 
     /// Adds a mean and its variance of `spp` samples to each half.
     fn merge(&mut self, a: &(Image, Image), b: &(Image, Image), spp: u32) {
-        let (n, m) = (f64::from(self.spp), 2.0 * f64::from(spp));
-        let share = m / (n + m);
+        let m = 2.0 * f64::from(spp);
         for i in 0..self.image.data.len() {
             let at = |image: &Image| f64::from(image.data[i]);
-            let (new, old) = (0.5 * (at(&a.0) + at(&b.0)), at(&self.image));
-            let difference = at(&self.difference);
-            let new_difference = at(&a.0) - at(&b.0);
-            // Sums of squared deviations: of the samples so far, of both new halves, and between all of them.
-            let squares = |variance: f64, n: f64| variance * n * (n - 1.0).max(0.0);
-            let within = squares(at(&self.variance), n) + squares(at(&a.1), m / 2.0) + squares(at(&b.1), m / 2.0);
-            let between = 0.25 * new_difference * new_difference * m + (new - old) * (new - old) * n * share;
-            self.variance.data[i] = ((within + between) / ((n + m) * (n + m - 1.0))) as f32;
-            self.image.data[i] = (old + share * (new - old)) as f32;
-            self.difference.data[i] = (difference + share * (new_difference - difference)) as f32;
+            let difference = at(&a.0) - at(&b.0);
+            let within = squares(at(&a.1), m / 2.0) + squares(at(&b.1), m / 2.0);
+            let between = 0.25 * difference * difference * m;
+            self.add_value(i, m, (0.5 * (at(&a.0) + at(&b.0)), within + between, difference));
         }
         self.spp += 2 * spp;
+    }
+
+    /// Adds a reference of other samples. The error says why that is not possible.
+    pub fn add(&mut self, other: &Self) -> std::result::Result<(), String> {
+        let size = |reference: &Self| (reference.image.width, reference.image.height);
+        if size(self) != size(other) {
+            return Err(format!("has {:?} pixels instead of {:?}", size(other), size(self)));
+        }
+        if self.fingerprint != other.fingerprint {
+            return Err("is of another scene".into());
+        }
+        if let Some(seed) = other.seeds().find(|&seed| self.seeds().any(|own| own == seed)) {
+            return Err(format!("has the same samples, those of --seed {seed}"));
+        }
+        let m = f64::from(other.spp);
+        for i in 0..self.image.data.len() {
+            let at = |image: &Image| f64::from(image.data[i]);
+            self.add_value(i, m, (at(&other.image), squares(at(&other.variance), m), at(&other.difference)));
+        }
+        self.spp += other.spp;
+        self.seconds += other.seconds;
+        self.added.extend(other.seeds());
+        Ok(())
+    }
+
+    /// Seeds of all samples.
+    fn seeds(&self) -> impl Iterator<Item = u64> {
+        std::iter::once(self.seed).chain(self.added.iter().copied())
+    }
+
+    /// Adds `m` samples of a value by their mean, their squared deviations from it, and the difference of their halves.
+    fn add_value(&mut self, i: usize, m: f64, (mean, deviations, difference): (f64, f64, f64)) {
+        let n = f64::from(self.spp);
+        let share = m / (n + m);
+        let at = |image: &Image| f64::from(image.data[i]);
+        let (old, old_difference) = (at(&self.image), at(&self.difference));
+        let between = (mean - old) * (mean - old) * n * share;
+        let all = squares(at(&self.variance), n) + deviations + between;
+        self.variance.data[i] = (all / ((n + m) * (n + m - 1.0))) as f32;
+        self.image.data[i] = (old + share * (mean - old)) as f32;
+        self.difference.data[i] = (old_difference + share * (difference - old_difference)) as f32;
     }
 
     /// Whether every value is one that half floats have room for.
@@ -125,7 +162,7 @@ impl Reference {
         let provenance = Provenance {
             method: "primal".into(),
             fingerprint: self.fingerprint.clone(),
-            seed: self.seed.to_string(),
+            seed: self.seeds().map(|seed| seed.to_string()).collect::<Vec<_>>().join("+"),
             spp: self.spp.to_string(),
             seconds: format!("{:.3}", self.seconds),
             ..Provenance::new()
@@ -150,7 +187,8 @@ impl Reference {
         let lacks = |name: &str| not_one(path, &format!("its header has no sensible `fluxion:{name}`"));
         let spp = spp.parse::<u32>().ok().filter(|spp| *spp > 0 && spp % 2 == 0);
         let seconds = seconds.parse::<f64>().ok().filter(|s| (0.0..1e9).contains(s));
-        let seed = seed.parse().ok();
+        let seeds = seed.split('+').map(|seed| seed.parse().ok()).collect::<Option<Vec<u64>>>();
+        let (seed, added) = seeds.and_then(|seeds| Some((*seeds.first()?, seeds[1..].to_vec()))).unzip();
         let fingerprint = Some(fingerprint).filter(|text| !text.is_empty());
         let positions = CHANNELS.map(|name| pixels.channels.iter().position(|other| other == name));
         let Some(positions) = positions.into_iter().collect::<Option<Vec<_>>>() else {
@@ -174,10 +212,16 @@ impl Reference {
             difference,
             spp: spp.ok_or_else(|| lacks("spp"))?,
             seed: seed.ok_or_else(|| lacks("seed"))?,
+            added: added.unwrap_or_default(),
             seconds: seconds.ok_or_else(|| lacks("seconds"))?,
             fingerprint: fingerprint.ok_or_else(|| lacks("fingerprint"))?,
         })
     }
+}
+
+/// Sum of `n` samples' squared deviations from their mean, from the variance of that.
+fn squares(variance: f64, n: f64) -> f64 {
+    variance * n * (n - 1.0).max(0.0)
 }
 
 /// Expected relMSE of the mean of two independent halves, from their difference.

@@ -4,7 +4,8 @@
 
 SCENES is a folder with NAME/scene.xml; REFERENCES one with NAME.exr and NAME_var.exr. With a depth other than the scenes' own the
 references are rendered here, by path tracing with --reference samples of another seed. Errors are means over seeds and geometric means over
-scenes. Run from the repository's top folder after `cargo build --release`. Needs PyPI openimageio and numpy.
+scenes; weights that a kernel comes with are compared with weights by variance of the first kernel. Run from the repository's top folder
+after `cargo build --release`. Needs PyPI openimageio and numpy.
 """
 import argparse
 import json
@@ -21,6 +22,12 @@ import exr
 FLUXION = os.environ.get("FLUXION", "target/release/fluxion")
 NAMES = ("cornell-box", "kitchen", "veach-ajar", "living-room", "classroom", "staircase")
 WEIGHTS = ("uniform", "variance")
+# Of kernels that come with weights.
+OWN_WEIGHTS = ("given", "product")
+
+
+def weights_of(kernel):
+    return WEIGHTS + (OWN_WEIGHTS if kernel.startswith("learned") else ())
 
 
 def run(*arguments):
@@ -49,7 +56,7 @@ def errors(args, folder, name, path, size, kernel, spp, seed):
     run("render", scene(args, name), "-o", image, "-q", "--size", size, "--spp", spp, "--seed", seed, "--layers", layers,
         "--method", "control_variate", "--kernel", kernel, "--shift", args.shift, "--json", stats, *depth)
     found = {}
-    for weights in WEIGHTS:
+    for weights in weights_of(kernel):
         run("reconstruct", layers, "-o", image, "-q", "--method", "control_variate:weights=" + weights)
         found[weights] = json.loads(run("compare", image, path, "--json"))
     with open(stats) as file:
@@ -69,28 +76,29 @@ def main():
     args = parser.parse_args()
     # Parameters of a kernel are given with + in place of a comma.
     kernels = [kernel.replace("+", ",") for kernel in args.kernels.split(",")]
-    print("| spp | weights | kernel | SMAPE | FLIP | relMSE | relMSE / first | worst | time / first |")
-    print("|---|---|---|---|---|---|---|---|---|")
+    print("| spp | weights | kernel | SMAPE | FLIP | relMSE | SMAPE / first | worst | relMSE / first | worst | time / first |")
+    print("|---|---|---|---|---|---|---|---|---|---|---|")
     with tempfile.TemporaryDirectory() as folder:
         references = {name: reference(args, name, folder) for name in NAMES}
         for spp in args.spp.split(","):
-            of = {(weights, kernel): [] for weights in WEIGHTS for kernel in kernels}
+            of = {(weights, kernel): [] for kernel in kernels for weights in weights_of(kernel)}
             for name in NAMES:
                 runs = {key: [] for key in of}
                 for seed in range(1, args.seeds + 1):
                     for kernel in kernels:
                         found, seconds = errors(args, folder, name, *references[name], kernel, spp, seed)
-                        for weights in WEIGHTS:
+                        for weights in weights_of(kernel):
                             metrics = found[weights]
                             runs[weights, kernel].append((metrics["smape"], metrics["flip"], metrics["relmse"], seconds))
                 for key, values in runs.items():
                     of[key].append([statistics.mean(column) for column in zip(*values)])
             for (weights, kernel), rows in of.items():
                 mean = [math.exp(statistics.mean(math.log(row[k]) for row in rows)) for k in range(4)]
-                ratios = [[a[k] / b[k] for a, b in zip(rows, of[weights, kernels[0]])] for k in range(4)]
+                first = of[weights if weights in WEIGHTS else WEIGHTS[-1], kernels[0]]
+                ratios = [[a[k] / b[k] for a, b in zip(rows, first)] for k in range(4)]
                 product = [math.exp(statistics.mean(map(math.log, column))) for column in ratios]
-                print("| %s | %s | %s | %.3f | %.3f | %.4f | %.2f | %.2f | %.2f |" % (
-                    spp, weights, kernel, *mean[:3], product[2], max(ratios[2]), product[3]), flush=True)
+                print("| %s | %s | %s | %.3f | %.3f | %.4f | %.2f | %.2f | %.2f | %.2f | %.2f |" % (
+                    spp, weights, kernel, *mean[:3], product[0], max(ratios[0]), product[2], max(ratios[2]), product[3]), flush=True)
 
 
 if __name__ == "__main__":

@@ -6,7 +6,7 @@
 //! | 4 | version of the format |
 //! | 4 | length of the header |
 //! | | header, JSON: origin of the film, seconds, first rejected sample, kernel, notes of an adaptive run |
-//! | | of a film with chosen neighbours: their mask of every pixel |
+//! | | of a film with chosen neighbours: their mask of every pixel, and weights, if any, as half floats |
 //! | | the film's statistics, tile by tile |
 //! | | of an adaptive run: every pixel's sample count goal, and the images of the pass before |
 //! | 4 | CRC-32 of everything before |
@@ -17,13 +17,14 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crc32fast::Hasher;
+use half::f16;
 use serde::{Deserialize, Serialize};
 
 use super::Origin;
 use crate::adaptive::Notes;
 use crate::error::{Error, Result};
 use crate::files;
-use crate::film::{EdgeNeed, Kernel, Needs, Neighbours, Rejected, Tile};
+use crate::film::{EdgeNeed, Kernel, Needs, Neighbours, Rejected, STEPS, StepWeights, Tile};
 use crate::render::SampleId;
 
 const MAGIC: [u8; 8] = *b"FLUXCKPT";
@@ -65,9 +66,11 @@ enum StoredKernel {
     #[default]
     Cross,
     Pending,
-    /// By masks that follow.
+    /// By masks that follow, and weights if there are any.
     Chosen {
         directed: bool,
+        #[serde(default)]
+        weighted: bool,
     },
 }
 
@@ -83,7 +86,9 @@ impl Header {
         let kernel = match kernel {
             Kernel::Cross => StoredKernel::Cross,
             Kernel::Pending => StoredKernel::Pending,
-            Kernel::Chosen(chosen) => StoredKernel::Chosen { directed: chosen.is_directed() },
+            Kernel::Chosen(chosen) => {
+                StoredKernel::Chosen { directed: chosen.is_directed(), weighted: !chosen.weights().is_empty() }
+            }
         };
         Self { origin, seconds, rejected: rejected.map(|(id, reason)| (id, reason.0.to_owned())), adaptive, kernel }
     }
@@ -162,8 +167,9 @@ fn start(to: &mut impl Write, header: &Header, kernel: &Kernel) -> io::Result<()
     to.write_all(&VERSION.to_le_bytes())?;
     to.write_all(&(header.len() as u32).to_le_bytes())?;
     to.write_all(&header)?;
-    let masks = if let Kernel::Chosen(chosen) = kernel { chosen.masks() } else { &[] };
-    masks.iter().try_for_each(|mask| to.write_all(&mask.to_le_bytes()))
+    let Kernel::Chosen(chosen) = kernel else { return Ok(()) };
+    chosen.masks().iter().try_for_each(|mask| to.write_all(&mask.to_le_bytes()))?;
+    chosen.weights().iter().flatten().try_for_each(|weight| to.write_all(&weight.to_le_bytes()))
 }
 
 /// Whether a file begins like a checkpoint.
@@ -196,9 +202,11 @@ impl Reader {
         let kernel = match header.kernel {
             StoredKernel::Cross => Kernel::Cross,
             StoredKernel::Pending => Kernel::Pending,
-            StoredKernel::Chosen { directed } => {
-                let masks = words(&mut from, size.0 * size.1).map_err(failed)?;
-                Kernel::Chosen(Arc::new(Neighbours::new(size, masks, directed)))
+            StoredKernel::Chosen { directed, weighted } => {
+                let pixels = size.0 * size.1;
+                let masks = words(&mut from, pixels).map_err(failed)?;
+                let weights = if weighted { weights(&mut from, pixels).map_err(failed)? } else { Vec::new() };
+                Kernel::Chosen(Arc::new(Neighbours::new(size, masks, directed).weighted(weights)))
             }
         };
         let statistics = (version == WITHOUT_ALPHA.0).then_some(WITHOUT_ALPHA.1);
@@ -279,6 +287,18 @@ fn words(from: &mut impl Read, count: usize) -> io::Result<Vec<u32>> {
         return Err(io::Error::from(io::ErrorKind::UnexpectedEof));
     }
     Ok(bytes.chunks_exact(4).map(|word| u32::from_le_bytes([word[0], word[1], word[2], word[3]])).collect())
+}
+
+/// Half floats across all steps of so many pixels.
+fn weights(from: &mut impl Read, pixels: usize) -> io::Result<Vec<StepWeights>> {
+    let halves: Vec<_> = words(from, pixels * STEPS.len() / 2)?
+        .into_iter()
+        .flat_map(|word| [word as u16, (word >> 16) as u16].map(f16::from_bits))
+        .collect();
+    if halves.iter().any(|weight| !weight.is_finite() || weight.is_sign_negative()) {
+        return Err(io::Error::new(io::ErrorKind::InvalidData, "a weight is no number from zero on"));
+    }
+    Ok(halves.chunks_exact(STEPS.len()).map(|of_pixel| std::array::from_fn(|step| of_pixel[step])).collect())
 }
 
 fn word(from: &mut impl Read) -> io::Result<u32> {

@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use fluxion::error::Error;
-use fluxion::neighbours::{PILOT, Selector};
+use fluxion::neighbours::Selector;
 use fluxion::reconstruct::{self, METHODS, Method, Reconstruction};
 
 use super::terminal::note;
@@ -13,9 +13,9 @@ pub struct Args {
     /// Neighbours that paths are shifted to; `fluxion info --kernels` lists them
     #[arg(long, default_value = "cross", hide_short_help = true, value_name = "NAME[:KEY=VALUE,...]")]
     kernel: String,
-    /// Samples without differences that neighbours are chosen by, for kernels that look at the picture
-    #[arg(long, default_value_t = PILOT, hide_short_help = true, value_name = "SPP", value_parser = clap::value_parser!(u32).range(1..))]
-    pilot: u32,
+    /// Samples without differences that neighbours are chosen by, for kernels that look at the picture [default: 4, of `learned` 8]
+    #[arg(long, hide_short_help = true, value_name = "SPP", value_parser = clap::value_parser!(u32).range(1..))]
+    pilot: Option<u32>,
 }
 
 impl Args {

@@ -60,8 +60,15 @@ impl Part {
     }
 }
 
-/// Channels of a frame's own edges, by name, each with the values of all pixels. Weights that come with the edges are left out. The
-/// error says which edges are too long.
+/// Channels of weights: at the lower and at the higher end of the edge.
+const ENDS: [&str; 2] = ["lower", "higher"];
+
+/// Name of the weights across a step, as in `edge_weight_2_-1.lower`.
+fn weight_name((x, y): (i32, i32), end: usize) -> String {
+    format!("edge_weight_{x}_{y}.{}", ENDS[end])
+}
+
+/// Channels of a frame's own edges, by name, each with the values of all pixels. The error says which edges are too long.
 pub fn channels(edges: &Edges) -> Result<Vec<(String, Vec<f32>)>, String> {
     let pixels = edges.pixels();
     let mut masks = vec![0u32; pixels];
@@ -75,6 +82,11 @@ pub fn channels(edges: &Edges) -> Result<Vec<(String, Vec<f32>)>, String> {
             let [lower, higher] = edges.ends(edge);
             masks[lower] |= 1 << step;
             masks[higher] |= 1 << opposite(step);
+        }
+        for end in (0..ENDS.len()).filter(|_| !edges.weights.is_empty()) {
+            let mut values = vec![0.0; pixels];
+            of_kind.iter().for_each(|&edge| values[edges.ends(edge)[0]] = edges.weights[edge][end]);
+            channels.push((weight_name(offset, end), values));
         }
         for part in Part::all().filter(|part| part.get(edges, of_kind[0]).is_some()) {
             for (c, channel) in RGB.iter().enumerate() {
@@ -112,6 +124,19 @@ pub fn edges(frame: &Frame, channel: impl Fn(&str) -> Option<Vec<f32>>) -> Optio
         if found {
             part.set(&mut edges, values);
         }
+    }
+    let mut weights = vec![[0.0; 2]; edges.len()];
+    let mut weighted = false;
+    for (kind, &offset) in edges.offsets().iter().enumerate() {
+        let [Some(lower), Some(higher)] = [0, 1].map(|end| channel(&weight_name(offset, end))) else { continue };
+        weighted = true;
+        for edge in (0..edges.len()).filter(|&edge| edges.kind(edge) == kind) {
+            let at = edges.ends(edge)[0];
+            weights[edge] = [lower[at], higher[at]];
+        }
+    }
+    if weighted {
+        edges.weights = weights;
     }
     let samples = frame.get(Layer::EdgeSamples).or_else(|| frame.get(Layer::Samples));
     let least = |samples: &Image, edge| edges.ends(edge).map(|end| samples.data[end] as u32).into_iter().min();

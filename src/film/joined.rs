@@ -37,6 +37,7 @@ impl Film {
         let least = |edge| ends(edge).map(|end| end.count()).min().unwrap_or(0);
         let counts = all.clone().map(least).collect();
         (edges.mean, edges.variance, edges.bins, edges.ambient, edges.counts) = (mean, variance, bins, ambient, counts);
+        edges.weights = weights(neighbours, &edges);
         edges
     }
 
@@ -44,9 +45,7 @@ impl Film {
     fn ends(&self, neighbours: &Neighbours, [a, b]: [usize; 2]) -> [Option<End<'_>>; 2] {
         let (lower, higher) = (a.min(b), a.max(b));
         let (width, _) = neighbours.size();
-        let across = |of: fn(usize, usize) -> usize| of(higher, width) as i32 - of(lower, width) as i32;
-        let offset = (across(|pixel, width| pixel % width), across(|pixel, width| pixel / width));
-        let Some(step) = STEPS.iter().position(|step| *step == offset) else { return [None, None] };
+        let Some(step) = step_between(width, lower, higher) else { return [None, None] };
         let end = |pixel: usize, step: usize, weight: f32| {
             let slot = neighbours.slot(pixel, step)?;
             let (tile, pixel) = self.at(pixel % width, pixel / width);
@@ -62,6 +61,27 @@ impl Film {
         }
         ends
     }
+}
+
+/// Position in [`STEPS`] of the step from a pixel to another one of images of some width.
+fn step_between(width: usize, from: usize, to: usize) -> Option<usize> {
+    let across = |of: fn(usize, usize) -> usize| of(to, width) as i32 - of(from, width) as i32;
+    let offset = (across(|pixel, width| pixel % width), across(|pixel, width| pixel / width));
+    STEPS.iter().position(|step| *step == offset)
+}
+
+/// Weights of the neighbour at either end of all edges; none if neighbours come without weights.
+fn weights(neighbours: &Neighbours, edges: &Edges) -> Vec<[f32; 2]> {
+    if neighbours.weights().is_empty() {
+        return Vec::new();
+    }
+    let of_edge = |edge: usize| {
+        let [lower, higher] = edges.ends(edge);
+        let at = |pixel: usize, step: usize| neighbours.weights()[pixel][step].to_f32();
+        let step = step_between(neighbours.size().0, lower, higher);
+        step.map_or([1.0; 2], |step| [at(lower, step), at(higher, opposite(step))])
+    };
+    (0..edges.len()).into_par_iter().map(of_edge).collect()
 }
 
 impl End<'_> {

@@ -26,7 +26,7 @@ pub use self::edges::{Cross, EdgeParts, Edges, HalfEdge};
 pub use self::frame::{Frame, half};
 pub use self::layer::Layer;
 pub use self::needs::{EdgeNeed, Needs};
-pub use self::neighbours::{CROSS, Neighbours, STEPS, beside, opposite};
+pub use self::neighbours::{CROSS, Neighbours, STEPS, StepWeights, beside, opposite};
 pub use self::provenance::Provenance;
 pub use self::sample::{Differences, Features, Rejected, Sample, Scattering};
 pub use self::statistic::bin_count;

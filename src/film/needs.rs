@@ -64,16 +64,19 @@ impl Needs {
         alpha: true,
     };
 
-    /// Colour and sampled edges.
-    pub const EDGES: Self = Self {
+    /// Colour alone.
+    pub const NONE: Self = Self {
         features: false,
-        edges: EdgeNeed::Sampled,
+        edges: EdgeNeed::Off,
         bins: false,
         occlusion: false,
         position: false,
         ambient: false,
         alpha: false,
     };
+
+    /// Colour and sampled edges.
+    pub const EDGES: Self = Self { edges: EdgeNeed::Sampled, ..Self::NONE };
 
     /// Bytes per pixel of a film with the edges of the cross, as long as the camera sees no emitter directly; 24 more where it
     /// does.

@@ -1,5 +1,7 @@
 //! Neighbours: which pixels the paths of every pixel are shifted to.
 
+use half::f16;
+
 /// Steps in x and y to the pixels of a 5x5 window: those of the cross first, else nearest ones first, and opposite steps side by
 /// side. A set of neighbours is a mask over this list.
 pub const STEPS: [(i32, i32); 24] = [
@@ -41,7 +43,7 @@ pub const fn opposite(step: usize) -> usize {
 }
 
 /// The neighbours of every pixel, its *kernel*, row by row.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Neighbours {
     /// Columns and rows.
     size: (usize, usize),
@@ -50,14 +52,19 @@ pub struct Neighbours {
     /// Whether an edge may be sampled from one of its ends alone. Random replay covers all paths of the other end from there;
     /// other shifts fail for some of them, and are biased without the other end.
     directed: bool,
+    /// Weights across all steps of every pixel, relative to its own; empty if neighbours come without weights.
+    weights: Vec<StepWeights>,
 }
+
+/// Weights across the steps of [`STEPS`].
+pub type StepWeights = [f16; STEPS.len()];
 
 impl Neighbours {
     /// Neighbours by masks over [`STEPS`]; steps out of the film are dropped. Unless edges may be `directed`, every neighbour has
     /// the pixel as a neighbour, too.
     pub fn new(size: (usize, usize), masks: Vec<u32>, directed: bool) -> Self {
         assert_eq!(masks.len(), size.0 * size.1, "one mask a pixel");
-        let mut made = Self { size, masks, directed };
+        let mut made = Self { size, masks, directed, weights: Vec::new() };
         for pixel in 0..made.masks.len() {
             made.masks[pixel] &= made.window(pixel);
         }
@@ -74,6 +81,13 @@ impl Neighbours {
         made
     }
 
+    /// The same with weights of the neighbours, relative to the pixels' own; none of any if there are none.
+    #[must_use]
+    pub fn weighted(self, weights: Vec<StepWeights>) -> Self {
+        assert!(weights.is_empty() || weights.len() == self.masks.len(), "weights of every pixel");
+        Self { weights, ..self }
+    }
+
     /// Mask of the steps that lead from a pixel to one of the film.
     fn window(&self, pixel: usize) -> u32 {
         let inside = |step: &usize| self.to(pixel, *step).is_some();
@@ -88,6 +102,11 @@ impl Neighbours {
     /// Masks of all pixels, row by row.
     pub fn masks(&self) -> &[u32] {
         &self.masks
+    }
+
+    /// Weights of all pixels across all steps, relative to their own; empty if there are none.
+    pub fn weights(&self) -> &[StepWeights] {
+        &self.weights
     }
 
     /// Whether edges may be sampled from one end alone.

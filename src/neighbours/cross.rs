@@ -1,6 +1,6 @@
 //! The cross: the four direct neighbours of every pixel (Lehtinen et al. 2013).
 
-use super::KernelKind;
+use super::{Choice, KernelKind};
 use crate::film::CROSS;
 
 /// `cross`.
@@ -8,6 +8,7 @@ pub const KERNEL: KernelKind = KernelKind {
     id: "cross",
     summary: "the four direct neighbours",
     k: CROSS.count_ones(),
+    parameters: &[],
     pilot: None,
-    select: |frame, _| vec![CROSS; frame.width * frame.height],
+    select: |pilot, _| Choice::unweighted(vec![CROSS; pilot.pixels()]),
 };

@@ -1,6 +1,6 @@
 //! Neighbours at random, for tests.
 
-use super::KernelKind;
+use super::{Choice, KernelKind, Parameter};
 use crate::film::STEPS;
 use crate::math::rng;
 
@@ -9,8 +9,11 @@ pub const KERNEL: KernelKind = KernelKind {
     id: "random",
     summary: "k pixels of a window of 5x5 at random, for tests",
     k: 4,
+    parameters: &[Parameter::K],
     pilot: None,
-    select: |frame, selector| (0..frame.width * frame.height).map(|pixel| choose(pixel as u64, selector.k)).collect(),
+    select: |pilot, selector| {
+        Choice::unweighted((0..pilot.pixels()).map(|pixel| choose(pixel as u64, selector.k)).collect())
+    },
 };
 
 /// The steps with the smallest random keys.

@@ -8,8 +8,8 @@
 
 use rayon::prelude::*;
 
-use super::{KernelKind, Selector};
-use crate::film::{EdgeNeed, Frame, Layer, Needs, STEPS, beside};
+use super::{Choice, FEATURES, KernelKind, Parameter, Pilot, Selector};
+use crate::film::{Frame, Layer, STEPS, beside};
 use crate::image::Image;
 
 /// `structure`.
@@ -17,15 +17,8 @@ pub const KERNEL: KernelKind = KernelKind {
     id: "structure",
     summary: "the k pixels of a window of 5x5 that are most similar in albedo, normal and depth (Manzi et al. 2014)",
     k: 4,
-    pilot: Some(Needs {
-        features: true,
-        edges: EdgeNeed::Off,
-        bins: false,
-        occlusion: false,
-        position: false,
-        ambient: false,
-        alpha: false,
-    }),
+    parameters: &[Parameter::K, Parameter::Threshold],
+    pilot: Some(FEATURES),
     select,
 };
 
@@ -45,7 +38,8 @@ struct Feature<'a> {
     relative: bool,
 }
 
-fn select(frame: &Frame, selector: &Selector) -> Vec<u32> {
+fn select(pilot: &Pilot, selector: &Selector) -> Choice {
+    let frame = pilot.frame;
     let features: Vec<_> = [
         (Layer::Albedo, Layer::AlbedoVariance, 0.1, false),
         (Layer::Normal, Layer::NormalVariance, 0.2, false),
@@ -56,8 +50,8 @@ fn select(frame: &Frame, selector: &Selector) -> Vec<u32> {
         Some(Feature { mean: frame.get(mean)?, variance: frame.get(variance)?, bandwidth, relative })
     })
     .collect();
-    let pixels = 0..frame.width * frame.height;
-    pixels.into_par_iter().map(|pixel| choose(frame, selector, &features, pixel)).collect()
+    let pixels = 0..pilot.pixels();
+    Choice::unweighted(pixels.into_par_iter().map(|pixel| choose(frame, selector, &features, pixel)).collect())
 }
 
 /// The most similar neighbours of a pixel.
@@ -95,7 +89,7 @@ impl Feature<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::CROSS;
+    use crate::film::{CROSS, Neighbours};
 
     /// A frame of two albedos with a border at column 3 and the given variance of all features.
     fn frame(variance: f32) -> Frame {
@@ -111,9 +105,13 @@ mod tests {
         frame
     }
 
+    fn select_by(kernel: &str, frame: &Frame) -> Neighbours {
+        Selector::parse(kernel, None).unwrap().select(&Pilot { frame, encoder: None }, true)
+    }
+
     #[test]
     fn neighbours_are_those_of_the_same_surface() {
-        let chosen = Selector::parse("structure", 4).unwrap().select(&frame(0.0), true);
+        let chosen = select_by("structure", &frame(0.0));
         for pixel in 0..30 {
             for step in chosen.steps(pixel) {
                 let to = chosen.to(pixel, step).unwrap();
@@ -123,13 +121,13 @@ mod tests {
         assert_eq!(chosen.masks()[13], CROSS);
         // Beside the border the direct neighbour across it is replaced by one along it.
         assert_eq!(chosen.masks()[14], CROSS & !1 | 1 << 5);
-        let strict = Selector::parse("structure:k=24,threshold=0.9", 4).unwrap().select(&frame(0.0), true);
+        let strict = select_by("structure:k=24,threshold=0.9", &frame(0.0));
         assert_eq!(strict.degree(14), 14);
     }
 
     #[test]
     fn what_lies_within_the_noise_makes_no_difference() {
-        let chosen = Selector::parse("structure", 4).unwrap().select(&frame(0.2), true);
+        let chosen = select_by("structure", &frame(0.2));
         assert_eq!(chosen.masks()[14], CROSS);
     }
 }

@@ -23,9 +23,9 @@ pub struct UNet {
 
 impl UNet {
     /// The network of arrays `first`, `down.0` to `down.N`, `middle`, `up.0` to `up.N-1`, `last` and `out`, each with `.weight`
-    /// and `.bias`. The error says what is wrong with them.
-    pub fn new(weights: &Weights, halvings: usize) -> Result<Self, String> {
-        let layer = |name: &str| weights.convolution(name, 1, Activation::Leaky(SLOPE));
+    /// and `.bias`, after a prefix. The error says what is wrong with them.
+    pub fn new(weights: &Weights, prefix: &str, halvings: usize) -> Result<Self, String> {
+        let layer = |name: &str| weights.convolution(&format!("{prefix}{name}"), 1, Activation::Leaky(SLOPE));
         let layers =
             |name: &str, count: usize| (0..count).map(|k| layer(&format!("{name}.{k}"))).collect::<Result<Vec<_>, _>>();
         let made = Self {
@@ -34,7 +34,7 @@ impl UNet {
             middle: layer("middle")?,
             up: layers("up", halvings)?,
             last: layer("last")?,
-            out: weights.convolution("out", 1, Activation::Linear)?,
+            out: weights.convolution(&format!("{prefix}out"), 1, Activation::Linear)?,
         };
         made.check()?;
         Ok(made)

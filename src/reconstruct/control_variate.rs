@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::edge_means::{self, Missing};
 use super::inputs::{Inputs, check_memory};
-use super::{Context, Method, Parameter, Parameters, Reconstruction, Solution, Traits};
+use super::{Context, Method, Note, Parameter, Parameters, Reconstruction, Solution, Traits};
 use crate::error::{Error, Result};
 use crate::film::{EdgeParts, Edges, Frame, HalfEdge, Layer, Needs, half};
 use crate::image::Image;
@@ -28,7 +28,7 @@ pub const METHOD: Method = Method {
         Parameter {
             name: "weights",
             default: "variance",
-            summary: "of the mean: `uniform`, unbiased; by inverse `variance`; or `given` with the frame's edges",
+            summary: "of the mean: `uniform`, unbiased; by inverse `variance`; `given` with the frame's edges, as by `--kernel learned`; or the `product` of both",
         },
         Parameter {
             name: "cross",
@@ -44,6 +44,8 @@ enum Weighting {
     Uniform,
     /// By weights that come with the edges.
     Given,
+    /// By these times the inverse variances of all samples.
+    Product,
     /// By the variances of all samples.
     Variance,
     /// Each half by the variances of the other one.
@@ -55,10 +57,11 @@ const BYTES: u64 = 450;
 const BYTES_WITH_BINS: u64 = 800;
 
 fn make(parameters: &Parameters) -> Result<Box<dyn Reconstruction>> {
-    let weights = parameters.choice("weights", &["uniform", "variance", "given"])?;
+    let weights = parameters.choice("weights", &["uniform", "variance", "given", "product"])?;
     let weighting = match (weights.as_str(), parameters.switch("cross")?) {
         ("uniform", _) => Weighting::Uniform,
         ("given", _) => Weighting::Given,
+        ("product", _) => Weighting::Product,
         (_, true) => Weighting::Cross,
         _ => Weighting::Variance,
     };
@@ -81,30 +84,43 @@ impl Reconstruction for ControlVariate {
         let bytes = if self.weighting == Weighting::Cross { BYTES_WITH_BINS } else { BYTES };
         check_memory(frame, context, METHOD.id, bytes)?;
         let edges = frame.edges(EdgeParts {
-            variance: self.weighting == Weighting::Variance,
+            variance: matches!(self.weighting, Weighting::Variance | Weighting::Product),
             bins: self.weighting == Weighting::Cross,
             ..EdgeParts::default()
         })?;
-        let solution = match self.weighting {
-            Weighting::Uniform => {
-                Stencil::new(&edges, |_, _| 1.0).apply(&edges, &Estimate::unweighted(&inputs, &edges)?, self.iterations)
-            }
-            Weighting::Given => {
-                Stencil::given(&edges)?.apply(&edges, &Estimate::unweighted(&inputs, &edges)?, self.iterations)
-            }
+        let parts = self.parts(&inputs, &edges)?;
+        let images = parts.iter().map(|(stencil, estimate)| stencil.apply(&edges, estimate, self.iterations));
+        let solution = images.reduce(|a, b| a.iter().zip(&b).map(|(a, b)| half_way(*a, *b)).collect());
+        let notes = if context.notes { parts[0].0.notes((frame.width, frame.height)) } else { Vec::new() };
+        Ok(Solution { image: inputs.image(&solution.unwrap_or_default()), alpha: None, error: None, notes })
+    }
+}
+
+impl ControlVariate {
+    /// Weights, and what they are applied to: all samples, or each half of them.
+    fn parts(&self, inputs: &Inputs, edges: &Edges) -> Result<Vec<(Stencil, Estimate)>> {
+        Ok(match self.weighting {
+            Weighting::Uniform => vec![(Stencil::new(edges, |_, _| 1.0), Estimate::unweighted(inputs, edges)?)],
+            Weighting::Given => vec![(Stencil::given(edges)?, Estimate::unweighted(inputs, edges)?)],
             Weighting::Variance => {
-                let all = Estimate::of_all(&inputs, &edges)?;
-                Stencil::by_variance(&edges, &all).apply(&edges, &all, self.iterations)
+                let all = Estimate::of_all(inputs, edges)?;
+                vec![(Stencil::by_variance(edges, &all), all)]
+            }
+            Weighting::Product => {
+                let all = Estimate::of_all(inputs, edges)?;
+                vec![(Stencil::by_product(edges, &all)?, all)]
             }
             Weighting::Cross => {
-                let halves = [Estimate::of_half(&inputs, &edges, 0)?, Estimate::of_half(&inputs, &edges, 1)?];
-                let [a, b] = [0, 1]
-                    .map(|k| Stencil::by_variance(&edges, &halves[1 - k]).apply(&edges, &halves[k], self.iterations));
-                a.iter().zip(&b).map(|(a, b)| std::array::from_fn(|c| 0.5 * (a[c] + b[c]))).collect()
+                let [a, b] = [Estimate::of_half(inputs, edges, 0)?, Estimate::of_half(inputs, edges, 1)?];
+                let [of_a, of_b] = [&b, &a].map(|other| Stencil::by_variance(edges, other));
+                vec![(of_a, a), (of_b, b)]
             }
-        };
-        Ok(Solution { image: inputs.image(&solution), alpha: None, error: None, notes: Vec::new() })
+        })
     }
+}
+
+fn half_way(a: Quad, b: Quad) -> Quad {
+    std::array::from_fn(|c| 0.5 * (a[c] + b[c]))
 }
 
 /// Colours and differences, and the variances of both, means over the channels; times the scale of the inputs.
@@ -159,6 +175,34 @@ impl Estimate {
             edge_variance: edge_means::box_mean(edges, (width, height), &of_edge, SMOOTHING, Missing::Nearest),
         }
     }
+}
+
+impl Estimate {
+    /// Inverse variances of a pixel's own value (`None`) and of its corrected neighbours as estimates of the pixel.
+    fn precision(&self) -> impl Fn(usize, Option<HalfEdge>) -> f32 + Sync {
+        let Self { color_variance, edge_variance, .. } = self;
+        let least = 1e-12 + 1e-6 * color_variance.iter().sum::<f32>() / color_variance.len() as f32;
+        move |pixel, half| {
+            let variance = match half {
+                None => color_variance[pixel],
+                Some(half) => color_variance[half.to] + edge_variance[half.edge],
+            };
+            1.0 / (variance + least)
+        }
+    }
+}
+
+/// Fails if edges come without weights.
+fn check_weights(edges: &Edges) -> Result<()> {
+    if edges.weights.is_empty() && !edges.is_empty() {
+        return Err(Error::BadData("the frame's edges come without weights; take `weights=variance`".into()));
+    }
+    Ok(())
+}
+
+/// The weight that comes with an edge at one of its ends, against one of the pixel itself (`None`).
+fn given_weight(edges: &Edges, half: Option<HalfEdge>) -> f32 {
+    half.map_or(1.0, |half| edges.weights[half.edge][usize::from(half.sign < 0.0)])
 }
 
 /// Pixels that a thread takes at a time.
@@ -222,23 +266,28 @@ impl Stencil {
 
     /// Weights that come with the edges, against one of the pixel itself.
     fn given(edges: &Edges) -> Result<Self> {
-        if edges.weights.is_empty() && !edges.is_empty() {
-            return Err(Error::BadData("the frame's edges come without weights; take `weights=variance`".into()));
-        }
-        Ok(Self::new(edges, |_, half| half.map_or(1.0, |half| edges.weights[half.edge][usize::from(half.sign < 0.0)])))
+        check_weights(edges)?;
+        Ok(Self::new(edges, |_, half| given_weight(edges, half)))
     }
 
     /// Inverse of the variance that the pixel's own value and each corrected neighbour have as estimates of the pixel.
     fn by_variance(edges: &Edges, estimate: &Estimate) -> Self {
-        let Estimate { color_variance, edge_variance, .. } = estimate;
-        let least = 1e-12 + 1e-6 * color_variance.iter().sum::<f32>() / color_variance.len() as f32;
-        Self::new(edges, |pixel, half| {
-            let variance = match half {
-                None => color_variance[pixel],
-                Some(half) => color_variance[half.to] + edge_variance[half.edge],
-            };
-            1.0 / (variance + least)
-        })
+        let precision = estimate.precision();
+        Self::new(edges, precision)
+    }
+
+    /// The product of both.
+    fn by_product(edges: &Edges, estimate: &Estimate) -> Result<Self> {
+        check_weights(edges)?;
+        let precision = estimate.precision();
+        Ok(Self::new(edges, |pixel, half| given_weight(edges, half) * precision(pixel, half)))
+    }
+
+    /// Pictures of the kernel: every pixel's number of neighbours, and the share of its own value in the mean.
+    fn notes(&self, (width, height): (usize, usize)) -> Vec<Note> {
+        let degrees = (0..self.own.len()).map(|pixel| self.row(pixel).len() as f32).collect();
+        let note = |name: &str, data| Note { name: name.to_owned(), image: Image { width, height, channels: 1, data } };
+        vec![note("degree", degrees), note("own_weight", self.own.clone())]
     }
 
     fn row(&self, pixel: usize) -> &[Neighbour] {

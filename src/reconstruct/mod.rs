@@ -205,7 +205,8 @@ fn check_edges(frame: &Frame) -> Result<()> {
         Some(_) => Some("variance"),
         None => edges.mean.iter().chain(binned).find(|value| !value.is_finite()).map(|_| "difference"),
     };
-    match wrong {
+    let impossible = |weight: &f32| !weight.is_finite() || *weight < 0.0;
+    match wrong.or_else(|| edges.weights.iter().flatten().find(|weight| impossible(weight)).map(|_| "weight")) {
         Some(what) => {
             Err(Error::BadData(format!("the frame has a {what} between chosen neighbours that is no possible one")))
         }

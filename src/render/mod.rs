@@ -9,6 +9,7 @@
 
 mod camera;
 mod continuation;
+mod control;
 mod direct;
 mod emission;
 mod features;
@@ -27,12 +28,10 @@ mod wave;
 
 use serde::{Deserialize, Serialize};
 
+pub use self::control::{CheckpointSink, Control, SampleSink, WaveSamples};
 pub use self::gradient::{SHIFTS, Shift};
 pub use self::sampler::Sampler;
-pub use self::schedule::{
-    Budget, CheckpointSink, Control, RenderOutcome, RenderSettings, SampleSink, WaveSamples, render, render_to_counts,
-    resume, sample,
-};
+pub use self::schedule::{Budget, RenderOutcome, RenderSettings, render, render_to_counts, resume, sample};
 pub use self::wave::Samples;
 
 /// One sample of one pixel, the same whenever and wherever it is asked for.

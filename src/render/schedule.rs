@@ -6,15 +6,16 @@ use std::time::{Duration, Instant};
 
 use rayon::prelude::*;
 
+use super::control::{Control, SampleSink, WaveSamples};
 use super::gradient::Shift;
 use super::per_tile::PerTile;
 use super::seen;
 use super::thinning::Shares;
-use super::wave::{Samples, Wave};
+use super::wave::Wave;
 use super::{SampleId, Sampler};
 use crate::film::{EdgeNeed, Film, Kernel, Needs, Rejected, Sample, TILE, Tile};
-use crate::math::{Rgb, Vec2};
-use crate::neighbours::Selector;
+use crate::math::Rgb;
+use crate::neighbours::{Encoder, Pilot, Selector};
 use crate::scene::Scene;
 
 /// Limit of a render.
@@ -51,54 +52,6 @@ impl RenderSettings {
     }
 }
 
-/// Receives checkpoints of a render.
-pub trait CheckpointSink: Sync {
-    /// Whether the next checkpoint is due; called between tiles.
-    fn due(&self) -> bool;
-
-    /// Saves a checkpoint; called while no tile is being rendered, and at the end of the render.
-    fn save(&self, outcome: &RenderOutcome);
-}
-
-/// One sample of each of some pixels.
-pub struct WaveSamples<'a> {
-    /// Number of the samples, from 0 on.
-    pub number: u32,
-    /// Position within the pixels, in [0, 1)².
-    pub film: Vec2,
-    /// The pixels, row by row.
-    pub pixels: &'a [(usize, usize)],
-    /// Their samples.
-    pub samples: &'a Samples<'a>,
-}
-
-/// Receives the samples of a render one by one.
-pub trait SampleSink: Sync {
-    /// Takes samples; called by all threads.
-    fn put(&self, wave: &WaveSamples);
-}
-
-/// Connections between the caller and a running render.
-#[derive(Clone, Copy)]
-pub struct Control<'a> {
-    /// Set by the caller to end the render after the tiles that are being rendered.
-    pub stop: &'a AtomicBool,
-    /// Called with the finished share, in [0, 1].
-    pub progress: &'a (dyn Fn(f32) + Sync),
-    /// Receiver of checkpoints.
-    pub sink: Option<&'a dyn CheckpointSink>,
-    /// Receiver of single samples.
-    pub samples: Option<&'a dyn SampleSink>,
-}
-
-/// The flag of renders that are never stopped; nobody sets it.
-static NEVER: AtomicBool = AtomicBool::new(false);
-
-impl Control<'_> {
-    /// Never stops, and reports to nobody.
-    pub const QUIET: Self = Self { stop: &NEVER, progress: &|_| {}, sink: None, samples: None };
-}
-
 /// A rendered film with its statistics.
 pub struct RenderOutcome {
     /// The film.
@@ -120,6 +73,8 @@ pub(crate) struct Choices {
     /// Result of [`seen::grids`].
     grids: PerTile<Vec<u32>>,
     shares: Shares,
+    /// Encoder of the pilot's samples while neighbours are pending, for kernels that ask for one.
+    encoder: Option<Encoder>,
 }
 
 impl RenderOutcome {
@@ -130,7 +85,7 @@ impl RenderOutcome {
 
     /// A film with its samples, as if no time had been spent on it.
     pub(crate) fn of(film: Film) -> Self {
-        let choices = Choices { grids: PerTile::new(film.tiles()), shares: Shares::new(film.tiles()) };
+        let choices = Choices { grids: PerTile::new(film.tiles()), shares: Shares::new(film.tiles()), encoder: None };
         let spp = film.fewest_samples();
         Self { film, spp, elapsed: Duration::ZERO, stopped: false, first_rejected: None, choices }
     }
@@ -202,14 +157,61 @@ fn run_round(scene: &Scene, settings: RenderSettings, control: &Control, outcome
     if fresh && settings.needs.edges.is_sampled() && !kernel.is_cross() {
         outcome.film = Film::new(outcome.film.width, outcome.film.height, outcome.film.needs).pending();
     }
-    if *outcome.film.kernel() == Kernel::Pending {
-        run_to(scene, settings, control, outcome, &|x, y| goals(x, y).min(kernel.pilot()));
-        if outcome.stopped || outcome.spp < kernel.pilot() {
-            return;
-        }
-        outcome.film.choose(kernel.select(&outcome.film.develop(), settings.shift.is_one_sided()));
+    if *outcome.film.kernel() == Kernel::Pending && !run_pilot(scene, settings, control, outcome, goals) {
+        return;
     }
     run_to(scene, settings, control, outcome, goals);
+}
+
+/// Renders the pilot as far as the goals go. Returns true when it is complete, and the neighbours are chosen.
+fn run_pilot(
+    scene: &Scene,
+    settings: RenderSettings,
+    control: &Control,
+    outcome: &mut RenderOutcome,
+    goals: Goals,
+) -> bool {
+    let (kernel, film) = (settings.kernel, &outcome.film);
+    if kernel.encodes() && outcome.choices.encoder.is_none() {
+        if film.samples() > 0 {
+            // Films from files come without what their samples were encoded to: the few there can be are taken again.
+            outcome.film = Film::new(film.width, film.height, film.needs).pending();
+        }
+        run_to(scene, settings, control, outcome, &|x, y| goals(x, y).min(1));
+        if outcome.stopped || outcome.spp < 1 {
+            return false;
+        }
+        outcome.choices.encoder = kernel.encoder(&outcome.film.develop(), scene.sensor());
+    }
+    let encoder = outcome.choices.encoder.take();
+    let both = Both { encoder: encoder.as_ref(), samples: control.samples };
+    let control = Control { samples: Some(&both), ..*control };
+    run_to(scene, settings, &control, outcome, &|x, y| goals(x, y).min(kernel.pilot()));
+    let complete = !outcome.stopped && outcome.spp >= kernel.pilot();
+    if complete {
+        let pilot = Pilot { frame: &outcome.film.develop(), encoder: encoder.as_ref() };
+        outcome.film.choose(kernel.select(&pilot, settings.shift.is_one_sided()));
+    } else {
+        outcome.choices.encoder = encoder;
+    }
+    complete
+}
+
+/// Samples of a pilot go to the encoder, and to whoever else wants them.
+struct Both<'a> {
+    encoder: Option<&'a Encoder>,
+    samples: Option<&'a dyn SampleSink>,
+}
+
+impl SampleSink for Both<'_> {
+    fn put(&self, wave: &WaveSamples) {
+        if let Some(encoder) = self.encoder {
+            encoder.put(wave.pixels, wave.samples.all);
+        }
+        if let Some(samples) = self.samples {
+            samples.put(wave);
+        }
+    }
 }
 
 /// Renders up to some goals, with pauses for checkpoints.

@@ -15,7 +15,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("solve", &["math", "film"]),
     ("synthetic", &["math", "image", "film"]),
     ("plan", &["scene", "film", "neighbours"]),
-    ("neighbours", &["film", "image", "math"]),
+    ("neighbours", &["scene", "film", "image", "nn", "math"]),
     ("render", &["scene", "film", "plan", "neighbours", "image", "math"]),
     ("nn", &["math"]),
     ("reconstruct", &["film", "image", "nn", "solve", "math"]),

@@ -69,6 +69,31 @@ fn a_reference_in_waves_is_the_one_in_a_single_go() {
 }
 
 #[test]
+fn references_of_several_machines_are_one_of_all_samples() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let make = |name: &str, seed: &str, spp: &str| {
+        let arguments = ["reference", &scene("cornell-box"), "-o", name, "--size", "16x12", "-q", "--seed", seed];
+        succeed(folder.path(), &[&arguments[..], &["--spp", spp]].concat());
+        Reference::load(&at(name)).unwrap()
+    };
+    let (a, b) = (make("a.exr", "1", "400"), make("b.exr", "2", "200"));
+    succeed(folder.path(), &["merge", "a.exr", "b.exr", "-o", "all.exr"]);
+    let all = Reference::load(&at("all.exr")).unwrap();
+    assert_eq!((all.spp, all.seed, &all.added[..]), (600, 1, &[2][..]));
+    for (i, value) in all.image.data.iter().enumerate() {
+        let expected = (2.0 * a.image.data[i] + b.image.data[i]) / 3.0;
+        assert!((value - expected).abs() <= 1e-5 * expected.max(1.0), "{value} {expected}");
+    }
+    // A third of the variance of the smaller one, and two thirds of that of the larger one, in the mean.
+    let mean = |reference: &Reference| reference.variance.data.iter().sum::<f32>();
+    let share = mean(&all) / (mean(&a) * 4.0 / 9.0 + mean(&b) / 9.0);
+    assert!((0.8..1.25).contains(&share), "{share}");
+    let (code, _, errors) = fluxion(folder.path(), &["merge", "all.exr", "b.exr", "-o", "more.exr"]);
+    assert!(code == 1 && errors.contains("b.exr: has the same samples, those of --seed 2"), "{errors}");
+}
+
+#[test]
 fn references_are_gone_on_with_and_never_mixed_up() {
     let folder = tempfile::tempdir().unwrap();
     let go = |more: &[&str]| {

@@ -116,10 +116,11 @@ fn edges_survive_files_to_the_bit() {
     let path = folder.path().join("a.exr");
     fluxion::exr::save(&path, &written).unwrap();
     let read = fluxion::exr::load(&path).unwrap();
-    // Weights are no part of files, and counts are those of the pixels.
+    // Counts are those of the pixels.
     let mut expected = written.own_edges().unwrap().clone();
     let samples = written.get(Layer::Samples).unwrap().data[0] as u32;
-    (expected.weights, expected.counts) = (Vec::new(), vec![samples; expected.len()]);
+    expected.counts = vec![samples; expected.len()];
+    assert!(!expected.weights.is_empty());
     written.set_edges(expected);
     assert!(read.own_edges() == written.own_edges());
     // Edges that files have no room for are not lost silently.
@@ -130,11 +131,18 @@ fn edges_survive_files_to_the_bit() {
     let message = fluxion::exr::save(&path, &long).unwrap_err().to_string();
     assert!(message.contains("a.exr") && message.contains("windows of 5x5"), "{message}");
     // Values that cannot be are refused.
-    let mut wrong = written.own_edges().unwrap().clone();
-    wrong.variance[7].y = -1.0;
-    written.set_edges(wrong);
-    let message = run("l2", &written).unwrap_err().to_string();
-    assert!(message.contains("variance between chosen neighbours"), "{message}");
+    let kept = written.own_edges().unwrap().clone();
+    for what in ["variance", "weight"] {
+        let mut wrong = kept.clone();
+        if what == "weight" {
+            wrong.weights[7][1] = -1.0;
+        } else {
+            wrong.variance[7].y = -1.0;
+        }
+        written.set_edges(wrong);
+        let message = run("l2", &written).unwrap_err().to_string();
+        assert!(message.contains(&format!("{what} between chosen neighbours")), "{message}");
+    }
 }
 
 #[test]

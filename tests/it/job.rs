@@ -1,6 +1,7 @@
 //! Renders in chunks: idempotent commands, a folder as the only state, and the image of one render.
 
 use std::fs;
+use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 use std::process::Command;
 use std::time::Duration;
@@ -119,6 +120,92 @@ fn chunks_that_are_stopped_killed_damaged_or_foreign_are_told_and_healed() {
     let film = |path: &Path| checkpoint::load(path).unwrap().outcome.film;
     fs::write(at.join("kept.ckpt"), &kept).unwrap();
     assert!(film(&one) == film(&at.join("kept.ckpt")));
+}
+
+/// A folder of programs that do what those of Slurm do, one task after the other, without a cluster.
+fn pretended_slurm(at: &Path) -> String {
+    let bin = at.join("bin");
+    fs::create_dir(&bin).unwrap();
+    let program = |name: &str, text: &str| {
+        fs::write(bin.join(name), format!("#!/bin/sh\n{text}\n")).unwrap();
+        fs::set_permissions(bin.join(name), fs::Permissions::from_mode(0o755)).unwrap();
+    };
+    // Numbers of an array such as 0-2,5; the script comes on standard input.
+    program(
+        "sbatch",
+        r#"cat > script; echo "$*" >> "$LOG"
+for option; do case $option in --array=*) array=${option#*=} ;; esac; done
+for part in $(echo "${array:-0}" | tr , ' '); do for task in $(seq "${part%-*}" "${part#*-}"); do
+    SLURM_ARRAY_JOB_ID=7 SLURM_ARRAY_TASK_ID=$task sh script >> "$LOG" 2>&1
+done; done; echo 7"#,
+    );
+    program("srun", "exec \"$@\"");
+    program("scontrol", "echo \"$@\" >> \"$LOG\"");
+    let fluxion = assert_cmd::cargo::cargo_bin("fluxion");
+    format!("{}:{}:{}", bin.display(), fluxion.parent().unwrap().display(), std::env::var("PATH").unwrap())
+}
+
+#[test]
+fn scripts_for_schedulers_carry_out_the_plan() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let plan = ["job", "plan", &scene("cornell-box"), "--spp", "32", "--chunks", "4", "-o", "it's", "--"];
+    expect(at, &[&plan[..], &["--size", "16x12", "--method", "l2", "-q"]].concat(), 0, "4 chunks");
+    expect(at, &["job", "run", "it's", "1"], 0, "");
+    let path = pretended_slurm(at);
+    let submit = || {
+        let mut command = Command::new("sh");
+        command
+            .current_dir(at)
+            .args(["it's/slurm.sh", "--partition=low"])
+            .env("PATH", &path)
+            .env("LOG", at.join("log"));
+        let output = command.output().unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        String::from_utf8(output.stdout).unwrap()
+    };
+    assert_eq!(submit(), "array 7, merge 7\n");
+    let log = fs::read_to_string(at.join("log")).unwrap();
+    assert!(log.contains("--array=0,2-3") && log.contains("--partition=low") && log.contains("afterany:7"), "{log}");
+    assert!(at.join("it's/cornell-box.exr").exists(), "{log}");
+    assert!(submit().contains("all chunks are complete"));
+    // Every task of the template runs one of the chunks, and the last step is the merge.
+    let template: serde_json::Value = serde_json::from_slice(&fs::read(at.join("it's/openjd.yaml")).unwrap()).unwrap();
+    let steps = template["steps"].as_array().unwrap();
+    assert_eq!(steps[0]["parameterSpace"]["taskParameterDefinitions"][0]["range"], "0-3");
+    let words = |step: usize| steps[step]["script"]["actions"]["onRun"]["args"].as_array().unwrap();
+    assert!(words(0)[..2] == ["job", "run"] && words(1)[..2] == ["job", "merge"] && words(0)[2] == words(1)[2]);
+}
+
+#[test]
+fn frames_are_images_of_their_own_and_scenes_must_not_change() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let text = format!(
+        "<scene version=\"3.0.0\"><default name=\"frame\" value=\"1\"/>{}<shape type=\"sphere\"><emitter type=\"area\">\
+         <rgb name=\"radiance\" value=\"$frame\"/></emitter></shape></scene>",
+        common::sensor("0,0,4", 8, 6)
+    );
+    fs::write(at.join("lamp.xml"), &text).unwrap();
+    let plan = |frames: &str, to: &str, code: i32, part: &str| {
+        let line = ["job", "plan", "lamp.xml", "--frames", frames, "--spp", "16", "--chunks", "2", "-o", to];
+        expect(at, &[&line[..], &["--", "--method", "primal", "-q"]].concat(), code, part);
+    };
+    plan("3-1", "none", 2, "no range such as 1-250");
+    plan("9-11", "j", 0, "6 chunks");
+    for chunk in ["0", "1", "2", "3", "4"] {
+        expect(at, &["job", "run", "j", chunk], 0, "");
+    }
+    expect(at, &["job", "merge", "j"], 2, "chunks 5 of lamp_0011");
+    expect(at, &["job", "run", "j", "5"], 0, "");
+    expect(at, &["job", "merge", "j"], 0, "lamp_0011.exr");
+    for frame in [9, 10, 11] {
+        let image = fluxion::image::io::read_color(&at.join(format!("j/lamp_{frame:04}.exr"))).unwrap();
+        assert_eq!(image.rgb(4, 3).x, frame as f32);
+    }
+    plan("1", "k", 0, "2 chunks");
+    fs::write(at.join("lamp.xml"), text.replace("sphere", "rectangle")).unwrap();
+    expect(at, &["job", "run", "k", "0"], 1, "lamp.xml: has changed since the plan");
 }
 
 #[test]

@@ -7,7 +7,9 @@ use std::time::Duration;
 use assert_cmd::Command;
 use fluxion::checkpoint::{self, Origin, Run};
 use fluxion::film::{EdgeNeed, EdgeParts, Edges, Film, Kernel, Layer, Needs};
+use fluxion::image::Image;
 use fluxion::neighbours::Selector;
+use fluxion::reconstruct::{self, Context};
 use fluxion::render::{Budget, Control, RenderOutcome, RenderSettings, Shift, render, resume};
 use fluxion::scene::Scene;
 use fluxion::scene::load::{self, Options};
@@ -17,7 +19,7 @@ use crate::common::{bundled, check_zero, film, root};
 const ALL: EdgeParts = EdgeParts { variance: true, bins: true, ambient: true };
 
 fn settings(kernel: &str, spp: u32, seed: u64, needs: Needs) -> RenderSettings {
-    let kernel = Selector::parse(kernel, 3).unwrap();
+    let kernel = Selector::parse(kernel, Some(3)).unwrap();
     RenderSettings { seed, kernel, ..RenderSettings::new(Budget::Spp(spp), needs) }
 }
 
@@ -145,11 +147,18 @@ fn a_pilot_counts_as_colour_but_not_as_differences() {
 
 #[test]
 fn renders_that_were_interrupted_choose_the_same_neighbours() {
+    // Neighbours by what the film holds, and by samples that it does not.
+    for kernel in ["structure", "learned"] {
+        check_interrupted(kernel);
+    }
+}
+
+fn check_interrupted(kernel: &str) {
     let scene = bundled("glossy-metal", (37, 21));
     let needs = Needs { edges: EdgeNeed::Thinned, ..NEEDS };
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.ckpt");
-    let settings = |spp| settings("structure", spp, 3, needs);
+    let settings = |spp| settings(kernel, spp, 3, needs);
     let origin = Origin {
         version: "1".into(),
         scene: "scene.xml".into(),
@@ -169,10 +178,10 @@ fn renders_that_were_interrupted_choose_the_same_neighbours() {
         let outcome = render(&scene, settings(spp), &Control::QUIET);
         checkpoint::save(&path, &origin, &outcome, None).unwrap();
         let loaded = checkpoint::load(&path).unwrap();
-        assert!(loaded.outcome.film == outcome.film && loaded.origin.kernel == origin.kernel, "{spp}");
+        assert!(loaded.outcome.film == outcome.film && loaded.origin.kernel == origin.kernel, "{kernel} {spp}");
         let start = loaded.resume(&Mutex::default()).render;
         let resumed = resume(&scene, settings(11), &Control::QUIET, start);
-        assert!(resumed.film == straight, "{spp}");
+        assert!(resumed.film == straight, "{kernel} {spp}");
     }
     let two = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
     assert!(two.install(|| kernel_film(&scene, settings(11))) == straight);
@@ -188,6 +197,28 @@ fn renders_that_were_interrupted_choose_the_same_neighbours() {
 }
 
 #[test]
+fn learned_kernels_come_with_weights() {
+    let scene = bundled("cornell-box", (40, 30));
+    for (kernel, degree) in [("learned", 4..9), ("learned:k=8", 8..17), ("learned:neighbours=cross", 2..5)] {
+        let film = kernel_film(&scene, settings(kernel, 8, 1, NEEDS));
+        let Kernel::Chosen(neighbours) = film.kernel() else { panic!("no neighbours were chosen") };
+        let inner = (0..40 * 30).filter(|pixel| pixel % 40 > 1 && pixel % 40 < 38 && (80..1120).contains(pixel));
+        assert!(inner.clone().all(|pixel| degree.contains(&neighbours.degree(pixel))), "{kernel}");
+        let frame = film.develop();
+        let edges = frame.edges(EdgeParts { variance: true, ..EdgeParts::default() }).unwrap();
+        assert!(edges.weights.len() == edges.len() && edges.weights.iter().flatten().all(|weight| *weight > 0.0));
+        // Both reconstructions are about as bright as the samples.
+        let mean = |image: &Image| image.data.iter().sum::<f32>() / image.data.len() as f32;
+        let expected = mean(frame.get(Layer::Color).unwrap());
+        for weights in ["given", "product"] {
+            let method = reconstruct::parse(&format!("control_variate:weights={weights}")).unwrap();
+            let found = mean(&method.reconstruct(&frame, &Context::QUIET).unwrap().image);
+            assert!((found / expected - 1.0).abs() < 0.25, "{kernel} {weights}: {found} for {expected}");
+        }
+    }
+}
+
+#[test]
 fn the_command_line_says_which_methods_take_which_neighbours() {
     let folder = tempfile::tempdir().unwrap();
     let scene = root().join("scenes/unit/diffuse/scene.xml");
@@ -199,7 +230,7 @@ fn the_command_line_says_which_methods_take_which_neighbours() {
     };
     for (extra, expected) in [
         (&["--kernel", "structure"][..], "take --method l2, l1, control_variate"),
-        (&["--kernel", "star", "--method", "l2"], "there are cross, nearest, structure, random"),
+        (&["--kernel", "star", "--method", "l2"], "there are cross, nearest, structure, learned, random"),
         (&["--kernel", "structure:k=0", "--method", "l2"], "k, a number from 1 to 24"),
         (&["--kernel", "structure", "--method", "l2", "--spp", "4"], "give a smaller --pilot"),
         (&["--max-depth", "x"], "a number of edges, or -1"),

@@ -20,8 +20,8 @@ import exr
 from frames import DARK
 from steps import HALF_PLANE
 
-SIZE, PILOT, TARGET = 128, 8, 160
-COUNTS = (8, 16, 32, 64)
+SIZE, PILOT, TARGET = 96, 8, 64
+COUNTS = (4, 8, 16, 32)
 # Replay traces every neighbour's path anew: samples beyond this many take too long.
 REPLAYED = 16
 LIMIT = 6e4
@@ -65,7 +65,7 @@ def frame(program, scene, number):
         # The pilot's colours count, as in a render.
         before = np.moveaxis(np.load(os.path.join(pilot, "color.npy")).mean(0, dtype=np.float64), -1, 0) * scale
         direct = np.moveaxis(np.load(os.path.join(pilot, "direct.npy")).mean(0, dtype=np.float64), -1, 0) * scale
-        colour = (PILOT * before + spp * (rgb("") - rgb("direct."))) / (PILOT + spp)
+        colour = (PILOT * before + spp * rgb("")) / (PILOT + spp)
         edges = np.stack([rgb("edge_%d_%d." % step) for step in HALF_PLANE])
         clean = np.moveaxis(exr.rgb(target), -1, 0) * scale - (rgb("direct.") * spp + direct * PILOT) / (PILOT + spp)
     half = lambda array: np.clip(array, -LIMIT, LIMIT).astype(np.float16)

@@ -6,7 +6,7 @@
 
 FRAMES is a folder of kernel_frames.py; ten of every hundred scenes are kept apart for tests. Samples of the pilot are encoded one by one;
 a U-Net sees their means and largest values (Josse et al. 2025). Scores choose neighbours by degrees that become sharper as training
-goes on; a third of the steps keeps the cross, so that one network serves both. `export` writes src/neighbours/learned.safetensors if the
+goes on; a third of the steps keeps the cross, so that one network serves both. `export` writes src/neighbours/learned/learned.safetensors if the
 gate holds: on the scenes kept apart less error than the cross with uniform weights, with both kinds of neighbours.
 """
 import glob
@@ -38,7 +38,7 @@ ITERATIONS, TEST_ITERATIONS = 20, 50
 RATE, STEPS_OF_TRAINING = 5e-4, 5000
 # Stiffness at the first step and at the last soft one; share of soft steps, and of those on the cross.
 STIFFNESS, SOFT, ON_CROSS = (1.0, 1e4), 0.7, 0.33
-EPSILON, SIMILARITY = 0.01, 0.3
+EPSILON, SIMILARITY, LEAST = 0.01, 0.3, 0.02
 
 
 class Network(nn.Module):
@@ -98,18 +98,46 @@ def all_edges(half):
     return torch.stack([at[step] if forward(step) else -shifted(at[back(step)], step) for step in STEPS])
 
 
+def around(image):
+    """Values of a window of 5x5 of every pixel row by row, (channels, 25, pixels), zero beyond the border."""
+    return F.unfold(image[None], 5, padding=2)[0].reshape(image.shape[0], 25, -1)
+
+
+class Means(torch.autograd.Function):
+    """Repeated means of windows by `weights`, (25, height, width), less a correction. The gradient runs the means backwards."""
+
+    @staticmethod
+    def forward(ctx, image, weights, correction, iterations):
+        flat, images = weights.reshape(25, -1), [image]
+        for _ in range(iterations):
+            images.append((around(images[-1]) * flat).sum(1).reshape(image.shape) - correction)
+        ctx.save_for_backward(weights, *images[:-1])
+        return images[-1]
+
+    @staticmethod
+    def backward(ctx, gradient):
+        weights, *images = ctx.saved_tensors
+        offsets = [(k % 5 - 2, k // 5 - 2) for k in range(25)]
+        back = torch.stack([shifted(weights[24 - k], offset) for k, offset in enumerate(offsets)]).reshape(25, -1)
+        of_weights, of_correction = torch.zeros_like(back), torch.zeros_like(gradient)
+        for image in reversed(images):
+            of_correction -= gradient
+            of_weights += (around(image) * gradient.reshape(gradient.shape[0], 1, -1)).sum(0)
+            gradient = (around(gradient) * back).sum(1).reshape(gradient.shape)
+        return gradient, of_weights.reshape(weights.shape), of_correction, None
+
+
 def solved(colour, edges, present, weights, iterations):
     """Control variates: means of each pixel and its corrected neighbours by weights, again and again. `present` says, (24, height, width),
     to which degree there is an edge."""
     inside = window(torch.ones_like(colour[:1]))[:, 0]
     of_neighbours = present * inside * weights[1:]
     total = weights[0] + of_neighbours.sum(0)
-    own, shares = weights[0] / total, (of_neighbours / total)[:, None]
-    correction = (shares * edges).sum(0)
-    image = colour
-    for _ in range(iterations):
-        image = own * image + (shares * window(image)).sum(0) - correction
-    return image
+    shares = of_neighbours / total
+    correction = (shares[:, None] * edges).sum(0)
+    by_place = {(0, 0): weights[0] / total} | dict(zip(STEPS, shares))
+    stencil = torch.stack([by_place[k % 5 - 2, k // 5 - 2] for k in range(25)])
+    return Means.apply(colour, stencil, correction, iterations)
 
 
 def shown(image, exposure):
@@ -129,8 +157,10 @@ class Frame:
         self.name = os.path.basename(path)[:-4]
         with np.load(path) as arrays:
             get = lambda name: torch.from_numpy(arrays[name])
-            self.samples = get("pilot").permute(0, 3, 1, 2).contiguous()
+            # The first sample has given the others their scale.
+            self.samples = get("pilot")[1:].permute(0, 3, 1, 2).contiguous()
             self.colour, self.edges, self.target, self.spp = get("colour"), get("edges"), get("target"), int(arrays["spp"])
+        self.plain = None
 
     def finite(self):
         return all(torch.isfinite(part).all() for part in (self.samples, self.colour, self.edges, self.target))
@@ -154,7 +184,7 @@ def parts(frame, turn=(False, False, False), colours=(0, 1, 2)):
     # Colour, albedo, normal (to the left, up and into the picture), and the rest.
     normal = samples[:, 6:9]
     if transposed:
-        normal = normal[:, [1, 0, 2]] * torch.tensor([1.0, 1.0, 1.0])[:, None, None]
+        normal = normal[:, [1, 0, 2]]
     normal = normal * torch.tensor([-1.0 if in_x else 1.0, -1.0 if in_y else 1.0, 1.0])[:, None, None]
     samples = torch.cat([samples[:, 0:3][:, colours], samples[:, 3:6][:, colours], normal, samples[:, 9:]], 1)
     return samples, turned(frame.colour)[colours], turned(edges[order])[:, colours], turned(frame.target)[colours]
@@ -175,6 +205,17 @@ def load(folders):
     frames = [Frame(path) for folder in folders for path in sorted(glob.glob(os.path.join(folder, "*.npz"))) if ".part" not in path]
     frames = [frame for frame in frames if frame.finite()]
     return [f for f in frames if not runs.is_apart(f.name)], [f for f in frames if runs.is_apart(f.name)]
+
+
+def plain(frame):
+    """SMAPE of the cross with uniform weights, which is looked for once."""
+    if frame.plain is None:
+        with torch.no_grad():
+            _, colour, edges, target = parts(frame)
+            shape, scale = colour.shape[1:], exposure(target)
+            image = solved(colour, edges, on_cross().expand(-1, *shape), torch.ones(COUNT + 1, *shape), ITERATIONS)
+            frame.plain = float(smape(image * scale, target * scale))
+    return frame.plain
 
 
 def train(options):
@@ -201,11 +242,7 @@ def train(options):
         scale = exposure(target)
         similar = ms_ssim(shown(image, scale)[None], shown(target, scale)[None])
         # In units of what the cross makes of it, so that dim and noisy frames weigh alike.
-        value = smape(image * scale, target * scale) + SIMILARITY * (1 - similar)
-        with torch.no_grad():
-            plain = smape(solved(colour, edges, on_cross().expand_as(scores), torch.ones_like(weights), ITERATIONS) * scale,
-                          target * scale)
-        value = value / (plain + 0.02)
+        value = (smape(image * scale, target * scale) + SIMILARITY * (1 - similar)) / (plain(frame) + LEAST)
         optimiser.zero_grad()
         value.backward()
         torch.nn.utils.clip_grad_norm_(net.parameters(), 1.0)
@@ -232,7 +269,8 @@ def compared(net, apart):
                 image = solved(colour, edges, present, weights, TEST_ITERATIONS)
                 return [float(smape(image * scale, target * scale)), 1 - float(ms_ssim(shown(image, scale)[None], shown(target, scale)[None]))]
             made = [errors(*case) for case in ((cross, ones), (cross, weights), (chosen, ones), (chosen, weights))]
-            rows.setdefault(frame.spp, []).append([*np.array(made[1:]).ravel() / np.tile(made[0], 3), float(chosen.sum(0).mean())])
+            if min(made[0]) > 0:
+                rows.setdefault(frame.spp, []).append([*np.array(made[1:]).ravel() / np.tile(made[0], 3), float(chosen.sum(0).mean())])
     print("| spp | frames | cross, learned weights | learned, uniform | learned, learned weights | degree |\n|---|---|---|---|---|---|")
     for spp in sorted(rows):
         mean = np.exp(np.log(rows[spp]).mean(0))
@@ -252,9 +290,9 @@ def export(options):
     if not compared(net, apart):
         raise SystemExit("not exported: the cross is better")
     net = net.half().float()
-    recipe = {"steps": steps, "rate": RATE, "seed": options.seed, "pilot": apart[0].samples.shape[0]}
+    recipe = {"steps": steps, "rate": RATE, "seed": options.seed, "encoded samples": apart[0].samples.shape[0]}
     save_file({name: value.half().contiguous() for name, value in net.state_dict().items()},
-              os.path.join(TOP, "src/neighbours/learned.safetensors"), {"recipe": json.dumps(recipe)})
+              os.path.join(TOP, "src/neighbours/learned/learned.safetensors"), {"recipe": json.dumps(recipe)})
     samples = apart[0].samples[:, :, :16, :24].float()
     with torch.no_grad():
         scores, weights = net(samples)

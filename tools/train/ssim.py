@@ -4,7 +4,7 @@ from torch.nn import functional as F
 
 RADIUS, SIGMA = 5, 1.5
 LIMITS = (0.01 ** 2, 0.03 ** 2)
-# Of the scales' exponents, finest first, those that a picture of 128 pixels a side has room for.
+# Of the scales' exponents, finest first, those that a picture of 96 pixels a side has room for.
 EXPONENTS = (0.0448, 0.2856, 0.3001, 0.2363)
 
 

@@ -2,7 +2,7 @@
 # Everything from nothing to the weights of a method: models, scenes, frames, training, gates. What is there is kept, so an
 # interrupted run goes on. Takes hours; FOLDER, from the repository's top, needs 30 GB.
 #
-#     tools/train/train.sh net|blend|gradnet FOLDER [SCENES]
+#     tools/train/train.sh net|blend|gradnet|kernels FOLDER [SCENES]
 set -eu
 cd "$(dirname "$0")/../.."
 method=$1
@@ -56,6 +56,10 @@ gradnet)
 	with_differences
 	weights gradnet gradnet-own "$folder/frames-whole" "$folder/frames-apart" --preset own
 	weights gradnet gradnet-paper "$folder/frames-whole" "$folder/frames-apart" --preset paper --width 16
+	;;
+kernels)
+	"$python" tools/train/kernel_frames.py "$folder/scenes" "$folder/frames-kernels" --fluxion "$fluxion"
+	weights kernels kernels "$folder/frames-kernels"
 	;;
 net | blend)
 	with_targets 02468 even 4,16,64

@@ -26,12 +26,12 @@ pub struct Args {
     no_image: bool,
 }
 
-/// Merges every scene's chunks into NAME.ckpt, and reconstructs NAME.exr by the method that they were rendered for.
+/// Merges every image's chunks into NAME.ckpt, and reconstructs NAME.exr by the method that they were rendered for.
 pub fn run(args: &Args) -> Result<ExitCode> {
     let job = Job::load(&args.job)?;
-    for scene in 0..job.scenes.len() {
+    for image in 0..job.images() {
         let parts = job.parts as usize;
-        let numbers = scene * parts..(scene + 1) * parts;
+        let numbers = image * parts..(image + 1) * parts;
         let (mut films, mut left) = (Vec::new(), Vec::new());
         for number in numbers {
             match chunk::state(&job, &args.job, number, false)? {
@@ -39,7 +39,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
                 _ => left.push(number),
             }
         }
-        let name = job.name(scene);
+        let name = job.name(image);
         if !left.is_empty() {
             let what = format!("chunks {} of {name} are not complete", ranges(&left));
             if !args.partial || films.is_empty() {

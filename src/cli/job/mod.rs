@@ -9,6 +9,7 @@ mod chunk;
 mod merge;
 mod plan;
 mod run;
+mod schedulers;
 mod status;
 
 use std::path::PathBuf;
@@ -26,7 +27,7 @@ pub struct Args {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Divide renders into chunks: job.json, and commands.txt with a command for each
+    /// Divide renders into chunks: job.json, commands.txt with a command for each, slurm.sh and openjd.yaml
     Plan(plan::Args),
     /// Render a chunk, unless it is complete; go on with it if it was interrupted
     Run {
@@ -37,7 +38,7 @@ enum Command {
     },
     /// Say which chunks are complete
     Status(status::Args),
-    /// Add up the chunks of every scene, and make its image
+    /// Add up the chunks of every image, and reconstruct it
     Merge(merge::Args),
 }
 

@@ -5,9 +5,9 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
 use fluxion::error::Error;
-use fluxion::files;
 
-use super::chunk::Job;
+use super::chunk::{Job, Settings};
+use super::schedulers;
 use crate::cli::terminal::out;
 
 /// Options of `job plan`.
@@ -22,7 +22,10 @@ pub struct Args {
     /// Samples per pixel
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
     spp: u32,
-    /// Chunks of every scene
+    /// Frames, as in 1-250: each is an image of its own, of the scene with -D frame=NUMBER
+    #[arg(long, value_name = "FIRST-LAST", value_parser = parse_frames)]
+    frames: Option<(u32, u32)>,
+    /// Chunks of every image
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     chunks: u32,
     /// Seed of the random numbers
@@ -33,18 +36,25 @@ pub struct Args {
     options: Vec<String>,
 }
 
-/// Writes the plan and the list of commands.
+/// First and last number of a range such as 1-250.
+fn parse_frames(text: &str) -> Result<(u32, u32), String> {
+    let wrong = || format!("`{text}` is no range such as 1-250");
+    let (first, last) = text.split_once('-').unwrap_or((text, text));
+    let frames = (first.parse().map_err(|_| wrong())?, last.parse().map_err(|_| wrong())?);
+    if frames.0 <= frames.1 && frames.1 < u32::MAX { Ok(frames) } else { Err(wrong()) }
+}
+
+/// Writes the plan, and what hands its chunks to schedulers.
 pub fn run(args: &Args) -> Result<ExitCode> {
     let folder = &args.output;
     if folder.join("job.json").exists() {
         bail!(Error::Usage(format!("{} has a job already: take another folder", folder.display())));
     }
-    let job = Job::new(&args.scenes, (args.spp, args.chunks), args.seed, &args.options)?;
+    let Args { frames, spp, chunks, seed, .. } = *args;
+    let job = Job::new(&Settings { scenes: &args.scenes, frames, spp, chunks, seed, options: &args.options })?;
     std::fs::create_dir_all(folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
     let absolute = folder.canonicalize().map_err(|error| Error::io(folder, error))?;
-    let quoted = absolute.display().to_string().replace('\'', r"'\''");
-    let command = |number| format!("fluxion job run '{quoted}' {number}\n");
-    files::write(&folder.join("commands.txt"), (0..job.chunks()).map(command).collect::<String>())?;
+    schedulers::write(folder, &absolute, job.chunks())?;
     job.save(folder)?;
     out!("{}: {} chunks; each line of commands.txt renders one", folder.display(), job.chunks())?;
     Ok(ExitCode::SUCCESS)

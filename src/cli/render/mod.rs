@@ -55,6 +55,9 @@ pub struct Args {
     /// together than films of different seeds
     #[arg(long, default_value_t = 0, hide_short_help = true, value_name = "N")]
     first: u32,
+    /// Fail unless the scene and the files that it names have this checksum
+    #[arg(long, hide = true, value_name = "CHECKSUM")]
+    content: Option<String>,
     #[command(flatten)]
     checkpoint: checkpoint::Args,
     /// Threads to work with (0: one per core)
@@ -111,6 +114,18 @@ pub struct Args {
 }
 
 impl Args {
+    /// Loads the scene.
+    fn load(&self) -> Result<Scene> {
+        let texture_memory = self.texture_memory << 20;
+        let options = load::Options { threads: self.threads, texture_memory, ..self.options.options() };
+        Ok(super::scene::load(&self.scene, &options)?)
+    }
+
+    /// Checksum of the scene and the files that it names.
+    pub fn content(&self) -> Result<String> {
+        Ok(content(&self.load()?)?)
+    }
+
     /// Fails if films that are rendered so with different samples cannot be merged.
     pub fn check_merging(&self) -> Result<()> {
         self.kernel.check_merging()
@@ -159,9 +174,10 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let _claims = Claims::new(&args.output, &[&args.layers, &args.json, &args.checkpoint.checkpoint], &[&args.scene])?;
     let mut stats = Stats { method: args.method.method.clone(), ..Stats::default() };
     let start = Instant::now();
-    let texture_memory = args.texture_memory << 20;
-    let options = load::Options { threads: args.threads, texture_memory, ..args.options.options() };
-    let mut scene = super::scene::load(&args.scene, &options)?;
+    let mut scene = args.load()?;
+    if args.content.as_ref().is_some_and(|known| content(&scene).is_ok_and(|found| found != *known)) {
+        bail!(Error::mismatch(&args.scene, "has changed since the plan was made, or a file that it names: plan anew"));
+    }
     stats.seconds.load = start.elapsed().as_secs_f64();
     if scene.emitters().is_empty() {
         note!("warning: nothing in {} emits light: the image is black", args.scene.display());

@@ -75,7 +75,7 @@ struct Net {
 
 fn make(parameters: &Parameters) -> Result<Box<dyn Reconstruction>> {
     let broken = |why| Error::backend(METHOD.id, why);
-    let network = Weights::parse(WEIGHTS).and_then(|weights| UNet::new(&weights, HALVINGS)).map_err(broken)?;
+    let network = Weights::parse(WEIGHTS).and_then(|weights| UNet::new(&weights, "", HALVINGS)).map_err(broken)?;
     let with_differences =
         Weights::parse(WITH_DIFFERENCES).and_then(|weights| GradNet::new(&weights)).map_err(broken)?;
     let image = parameters.choice("image", &["auto", "network", "safe", "filtered"])?;
@@ -250,7 +250,7 @@ mod tests {
     fn images_are_those_of_pytorch() {
         let bytes = include_bytes!("../../../tests/data/net.safetensors");
         let [features, images, logits, output] = vectors(bytes, ["features", "images", "logits", "output"]);
-        let network = UNet::new(&Weights::parse(WEIGHTS).unwrap(), HALVINGS).unwrap();
+        let network = UNet::new(&Weights::parse(WEIGHTS).unwrap(), "", HALVINGS).unwrap();
         assert_eq!((network.inputs(), network.multiple()), (features.channels, 16));
         let made = network.apply(&features, ROWS);
         let largest = logits.data.iter().fold(0.0f32, |most, value| most.max(value.abs()));

@@ -1,0 +1,55 @@
+//! Connections between a running render and its caller.
+
+use std::sync::atomic::AtomicBool;
+
+use super::schedule::RenderOutcome;
+use super::wave::Samples;
+use crate::math::Vec2;
+
+/// Receives checkpoints of a render.
+pub trait CheckpointSink: Sync {
+    /// Whether the next checkpoint is due; called between tiles.
+    fn due(&self) -> bool;
+
+    /// Saves a checkpoint; called while no tile is being rendered, and at the end of the render.
+    fn save(&self, outcome: &RenderOutcome);
+}
+
+/// One sample of each of some pixels.
+pub struct WaveSamples<'a> {
+    /// Number of the samples, from 0 on.
+    pub number: u32,
+    /// Position within the pixels, in [0, 1)².
+    pub film: Vec2,
+    /// The pixels, row by row.
+    pub pixels: &'a [(usize, usize)],
+    /// Their samples.
+    pub samples: &'a Samples<'a>,
+}
+
+/// Receives the samples of a render one by one.
+pub trait SampleSink: Sync {
+    /// Takes samples; called by all threads.
+    fn put(&self, wave: &WaveSamples);
+}
+
+/// Connections between the caller and a running render.
+#[derive(Clone, Copy)]
+pub struct Control<'a> {
+    /// Set by the caller to end the render after the tiles that are being rendered.
+    pub stop: &'a AtomicBool,
+    /// Called with the finished share, in [0, 1].
+    pub progress: &'a (dyn Fn(f32) + Sync),
+    /// Receiver of checkpoints.
+    pub sink: Option<&'a dyn CheckpointSink>,
+    /// Receiver of single samples.
+    pub samples: Option<&'a dyn SampleSink>,
+}
+
+/// The flag of renders that are never stopped; nobody sets it.
+static NEVER: AtomicBool = AtomicBool::new(false);
+
+impl Control<'_> {
+    /// Never stops, and reports to nobody.
+    pub const QUIET: Self = Self { stop: &NEVER, progress: &|_| {}, sink: None, samples: None };
+}
