@@ -1,6 +1,6 @@
 """Reconstructions on the cross and on other kernels at equal samples, as the tables of docs/kernels.md.
 
-    python tools/kernels.py SCENES REFERENCES [--depth N [--reference 8192]] [--spp 16,64] [--seeds 3] [--kernels cross,structure] [--shift reconnect]
+    python tools/kernels.py SCENES REFERENCES [--depth N [--reference 8192] [--keep DIR]] [--spp 16,64] [--seeds 3] [--kernels cross,structure] [--shift reconnect]
 
 SCENES is a folder with NAME/scene.xml; REFERENCES one with NAME.exr and NAME_var.exr. With a depth other than the scenes' own the
 references are rendered here, by path tracing with --reference samples of another seed. Errors are means over seeds and geometric means over
@@ -39,9 +39,10 @@ def reference(args, name, folder):
     path = os.path.join(args.references, name + ".exr")
     width, height = np.stack([exr.everything(path)[c] for c in "RGB"], -1).shape[1::-1]
     if args.depth:
-        path = os.path.join(folder, "%s-%d.exr" % (name, args.depth))
-        run("render", scene(args, name), "-o", path, "-q", "--size", "%dx%d" % (width, height), "--spp", args.reference, "--seed", 977,
-            "--method", "primal", "--max-depth", args.depth)
+        path = os.path.join(args.keep or folder, "%s-%d-%d.exr" % (name, args.depth, args.reference))
+        if not os.path.exists(path):
+            run("render", scene(args, name), "-o", path, "-q", "--size", "%dx%d" % (width, height), "--spp", args.reference, "--seed", 977,
+                "--method", "primal", "--max-depth", args.depth)
     return path, "%dx%d" % (width, height)
 
 
@@ -69,6 +70,7 @@ def main():
     parser.add_argument("references")
     parser.add_argument("--depth", type=int)
     parser.add_argument("--reference", type=int, default=8192)
+    parser.add_argument("--keep", help="folder for references that are rendered, to be found again")
     parser.add_argument("--spp", default="16,64")
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--kernels", default="cross,structure")
