@@ -45,9 +45,10 @@ impl Plan {
     #[must_use]
     pub fn with_kernel(mut self, kernel: &Selector) -> Self {
         if !kernel.is_cross() {
-            let reason = match kernel.pilot() {
-                0 => format!("the neighbours of {kernel} do not depend on the picture"),
-                spp => format!("{spp} samples without differences choose the neighbours of {kernel}"),
+            let reason = match (kernel.pilot(), kernel.without_differences()) {
+                (0, _) => format!("the neighbours of {kernel} do not depend on the picture"),
+                (spp, 0) => format!("{spp} samples decide the weights of {kernel}"),
+                (spp, _) => format!("{spp} samples without differences choose the neighbours of {kernel}"),
             };
             self.items.push(Item { name: "pilot", computed: kernel.pilot() > 0, reason });
         }

@@ -49,10 +49,9 @@ impl Args {
             note!("warning: this method takes no differences: --kernel changes nothing");
             return Ok(Selector::default());
         }
-        if let Some(spp) = spp.filter(|&spp| spp <= selector.pilot()) {
-            let pilot = selector.pilot();
-            let what =
-                format!("a pilot of {pilot} samples leaves none of {spp} for differences: give a smaller --pilot");
+        let pilot = selector.pilot();
+        if let Some(spp) = spp.filter(|&spp| spp < pilot || spp <= selector.without_differences()) {
+            let what = format!("a pilot of {pilot} samples is too long for {spp}: give a smaller --pilot");
             return Err(Error::Usage(what).into());
         }
         Ok(selector)

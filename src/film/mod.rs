@@ -85,10 +85,12 @@ impl Film {
         self
     }
 
-    /// Chooses the neighbours that edges lead to. Edges that were recorded before are lost.
+    /// Chooses the neighbours that edges lead to, and their weights. Edges that were recorded to other neighbours are lost.
     pub fn choose(&mut self, neighbours: Neighbours) {
         assert_eq!(neighbours.size(), (self.width, self.height), "neighbours of another film");
-        self.tiles.iter_mut().for_each(|tile| tile.set_neighbours(self.needs, &neighbours));
+        if !matches!(&self.kernel, Kernel::Chosen(before) if before.masks() == neighbours.masks()) {
+            self.tiles.iter_mut().for_each(|tile| tile.set_neighbours(self.needs, &neighbours));
+        }
         self.kernel = Kernel::Chosen(Arc::new(neighbours));
     }
 

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Encoder, KERNELS, KernelKind, Parameter, Pilot, learned, structure};
 use crate::error::{Error, Result};
-use crate::film::{Frame, Needs, Neighbours, STEPS};
+use crate::film::{CROSS, Frame, Kernel, Needs, Neighbours, STEPS};
 use crate::scene::sensor::Sensor;
 
 /// A kernel with its parameters.
@@ -74,7 +74,7 @@ impl Selector {
         if self.is_cross() { String::new() } else { self.to_string() }
     }
 
-    /// Samples that every pixel has before its neighbours are chosen; zero if they do not depend on any.
+    /// Samples that every pixel has before its neighbours are chosen, or their weights; zero if these do not depend on any.
     pub fn pilot(&self) -> u32 {
         self.pilot
     }
@@ -92,6 +92,26 @@ impl Selector {
     /// Whether the choice depends on samples one by one.
     pub fn encodes(&self) -> bool {
         self.row().pilot.is_some_and(|pilot| pilot.encoded)
+    }
+
+    /// Neighbours that are known before the pilot, which then has differences, too, and only gives them weights; none if it
+    /// chooses them. Edges may be `directed`, as by [`Selector::select`].
+    pub fn known(&self, size: (usize, usize), directed: bool) -> Option<Neighbours> {
+        self.keeps_cross.then(|| Neighbours::new(size, vec![CROSS; size.0 * size.1], directed))
+    }
+
+    /// Whether a film with these half-edges is still to have its neighbours, or their weights, chosen.
+    pub fn is_pending(&self, kernel: &Kernel) -> bool {
+        match kernel {
+            Kernel::Cross => false,
+            Kernel::Pending => true,
+            Kernel::Chosen(neighbours) => self.keeps_cross && neighbours.weights().is_empty(),
+        }
+    }
+
+    /// Samples of every pixel before the first one with differences.
+    pub fn without_differences(&self) -> u32 {
+        if self.keeps_cross { 0 } else { self.pilot }
     }
 
     /// Chooses the neighbours of every pixel. Unless edges may be `directed`, pixels that were chosen choose back.

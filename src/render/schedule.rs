@@ -155,12 +155,24 @@ fn run_round(scene: &Scene, settings: RenderSettings, control: &Control, outcome
     let kernel = settings.kernel;
     let fresh = *outcome.film.kernel() == Kernel::Cross && outcome.film.samples() == 0;
     if fresh && settings.needs.edges.is_sampled() && !kernel.is_cross() {
-        outcome.film = Film::new(outcome.film.width, outcome.film.height, outcome.film.needs).pending();
+        outcome.film = empty(&outcome.film, settings);
     }
-    if *outcome.film.kernel() == Kernel::Pending && !run_pilot(scene, settings, control, outcome, goals) {
+    if kernel.is_pending(outcome.film.kernel()) && !run_pilot(scene, settings, control, outcome, goals) {
         return;
     }
     run_to(scene, settings, control, outcome, goals);
+}
+
+/// A film like another one without samples, at the beginning of its pilot.
+fn empty(film: &Film, settings: RenderSettings) -> Film {
+    let mut made = Film::new(film.width, film.height, film.needs);
+    match settings.kernel.known((film.width, film.height), settings.shift.is_one_sided()) {
+        Some(neighbours) => {
+            made.choose(neighbours);
+            made
+        }
+        None => made.pending(),
+    }
 }
 
 /// Renders the pilot as far as the goals go. Returns true when it is complete, and the neighbours are chosen.
@@ -175,7 +187,7 @@ fn run_pilot(
     if kernel.encodes() && outcome.choices.encoder.is_none() {
         if film.samples() > 0 {
             // Films from files come without what their samples were encoded to: the few there can be are taken again.
-            outcome.film = Film::new(film.width, film.height, film.needs).pending();
+            outcome.film = empty(film, settings);
         }
         run_to(scene, settings, control, outcome, &|x, y| goals(x, y).min(1));
         if outcome.stopped || outcome.spp < 1 {

@@ -148,7 +148,7 @@ fn a_pilot_counts_as_colour_but_not_as_differences() {
 #[test]
 fn renders_that_were_interrupted_choose_the_same_neighbours() {
     // Neighbours by what the film holds, and by samples that it does not.
-    for kernel in ["structure", "learned"] {
+    for kernel in ["structure", "learned", "learned:neighbours=cross"] {
         check_interrupted(kernel);
     }
 }
@@ -233,6 +233,7 @@ fn the_command_line_says_which_methods_take_which_neighbours() {
         (&["--kernel", "star", "--method", "l2"], "there are cross, nearest, structure, learned, random"),
         (&["--kernel", "structure:k=0", "--method", "l2"], "k, a number from 1 to 24"),
         (&["--kernel", "structure", "--method", "l2", "--spp", "4"], "give a smaller --pilot"),
+        (&["--kernel", "learned:neighbours=cross", "--method", "l2", "--spp", "7"], "give a smaller --pilot"),
         (&["--max-depth", "x"], "a number of edges, or -1"),
     ] {
         let (done, message) = run(extra);

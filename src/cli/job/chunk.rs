@@ -147,7 +147,7 @@ impl Job {
     }
 
     fn frames_per_scene(&self) -> usize {
-        self.frames.map_or(1, |(first, last)| (last + 1).saturating_sub(first) as usize)
+        self.frames.map_or(1, |(first, last)| last.checked_sub(first).map_or(0, |more| more as usize + 1))
     }
 
     /// The scene of an image, and the number of the frame if there are several.
