@@ -199,11 +199,13 @@ fn check_interrupted(kernel: &str) {
 #[test]
 fn learned_kernels_come_with_weights() {
     let scene = bundled("cornell-box", (40, 30));
-    for (kernel, degree) in [("learned", 4..9), ("learned:k=8", 8..17), ("learned:neighbours=cross", 2..5)] {
+    for (kernel, chosen) in [("learned", 4), ("learned:k=8", 8), ("learned:neighbours=cross", 4)] {
         let film = kernel_film(&scene, settings(kernel, 8, 1, NEEDS));
         let Kernel::Chosen(neighbours) = film.kernel() else { panic!("no neighbours were chosen") };
-        let inner = (0..40 * 30).filter(|pixel| pixel % 40 > 1 && pixel % 40 < 38 && (80..1120).contains(pixel));
-        assert!(inner.clone().all(|pixel| degree.contains(&neighbours.degree(pixel))), "{kernel}");
+        let mut inner = (0..40 * 30).filter(|pixel| pixel % 40 > 1 && pixel % 40 < 38 && (80..1120).contains(pixel));
+        // Every pixel has those that it chose, and those that chose it: at most twice as many in the mean.
+        assert!(inner.all(|pixel| neighbours.degree(pixel) >= chosen), "{kernel}");
+        assert!(neighbours.mean_degree() <= 2.0 * chosen as f64, "{kernel}: {}", neighbours.mean_degree());
         let frame = film.develop();
         let edges = frame.edges(EdgeParts { variance: true, ..EdgeParts::default() }).unwrap();
         assert!(edges.weights.len() == edges.len() && edges.weights.iter().flatten().all(|weight| *weight > 0.0));
