@@ -40,6 +40,15 @@ impl Scattering {
     /// The surface emits light.
     pub const EMISSION: Self = Self(32);
 
+    /// Every kind, in the order of arrays of them.
+    pub const KINDS: [Self; 6] =
+        [Self::DIFFUSE, Self::GLOSSY, Self::SPECULAR, Self::REFLECTION, Self::TRANSMISSION, Self::EMISSION];
+
+    /// One for each of the kinds that belongs to the set, and zero for the others.
+    pub fn indicators(self) -> [f32; Self::KINDS.len()] {
+        Self::KINDS.map(|kind| f32::from(u8::from(self.has(kind))))
+    }
+
     /// Whether these kinds belong to the set.
     pub fn has(self, kinds: Self) -> bool {
         self.0 & kinds.0 == kinds.0

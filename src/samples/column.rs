@@ -14,16 +14,6 @@ pub struct Column {
     pub append: fn(&Sample, &Sensor, &mut Vec<f32>),
 }
 
-/// Kinds of scattering, in the order of the channels.
-const KINDS: [Scattering; 6] = [
-    Scattering::DIFFUSE,
-    Scattering::GLOSSY,
-    Scattering::SPECULAR,
-    Scattering::REFLECTION,
-    Scattering::TRANSMISSION,
-    Scattering::EMISSION,
-];
-
 /// Every quantity.
 pub const COLUMNS: &[Column] = &[
     Column {
@@ -64,9 +54,9 @@ pub const COLUMNS: &[Column] = &[
     },
     Column {
         name: "scattering",
-        channels: KINDS.len(),
+        channels: Scattering::KINDS.len(),
         content: "0 or 1 each: diffuse and glossy lobes of that surface; it is a mirror or clear, or seen through such; reflection and \
                   transmission at the camera's first surface; emission of that surface",
-        append: |sample, _, to| to.extend(KINDS.map(|kind| f32::from(u8::from(sample.features.scattering.has(kind))))),
+        append: |sample, _, to| to.extend(sample.features.scattering.indicators()),
     },
 ];

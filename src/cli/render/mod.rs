@@ -56,7 +56,7 @@ pub struct Args {
     #[arg(long, default_value_t = 0, hide_short_help = true, value_name = "N")]
     first: u32,
     /// Fail unless the scene and the files that it names have this checksum
-    #[arg(long, hide = true, value_name = "CHECKSUM")]
+    #[arg(long, hide = true, requires = "checkpoint", value_name = "CHECKSUM")]
     content: Option<String>,
     #[command(flatten)]
     checkpoint: checkpoint::Args,
@@ -175,9 +175,6 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let mut stats = Stats { method: args.method.method.clone(), ..Stats::default() };
     let start = Instant::now();
     let mut scene = args.load()?;
-    if args.content.as_ref().is_some_and(|known| content(&scene).is_ok_and(|found| found != *known)) {
-        bail!(Error::mismatch(&args.scene, "has changed since the plan was made, or a file that it names: plan anew"));
-    }
     stats.seconds.load = start.elapsed().as_secs_f64();
     if scene.emitters().is_empty() {
         note!("warning: nothing in {} emits light: the image is black", args.scene.display());
@@ -202,6 +199,9 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         return replay(args, &scene, sample);
     }
     let origin = args.checkpoint.checkpoint.as_ref().map(|_| origin(args, &scene, &plan, kernel)).transpose()?;
+    if origin.as_ref().is_some_and(|origin| args.content.as_ref().is_some_and(|known| origin.content != *known)) {
+        bail!(Error::mismatch(&args.scene, "has changed since the plan was made, or a file that it names: plan anew"));
+    }
     let journal = Mutex::default();
     let start = match origin.as_ref().map(|origin| args.checkpoint.load(origin)).transpose()?.flatten() {
         Some(checkpoint) => checkpoint.resume(&journal),

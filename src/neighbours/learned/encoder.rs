@@ -3,7 +3,7 @@
 use std::sync::{Mutex, PoisonError};
 
 use super::SLOPE;
-use crate::film::{Frame, Layer, Sample, Scattering};
+use crate::film::{Frame, Layer, Sample};
 use crate::nn::{Activation, Convolution, Tensor, Weights};
 use crate::scene::sensor::Sensor;
 
@@ -15,16 +15,6 @@ pub const CHANNELS: usize = 32;
 
 /// Dense layers.
 const LAYERS: usize = 3;
-
-/// Kinds of scattering, in the order of the features.
-const KINDS: [Scattering; 6] = [
-    Scattering::DIFFUSE,
-    Scattering::GLOSSY,
-    Scattering::SPECULAR,
-    Scattering::REFLECTION,
-    Scattering::TRANSMISSION,
-    Scattering::EMISSION,
-];
 
 /// Least mean of the colour, whose inverse is still a float.
 const DARK: f32 = 1e-18;
@@ -112,7 +102,7 @@ impl Encoder {
         to.extend(normal.to_array());
         to.push(features.depth / (features.depth + self.middle));
         to.push(features.roughness);
-        to.extend(KINDS.map(|kind| f32::from(u8::from(features.scattering.has(kind)))));
+        to.extend(features.scattering.indicators());
         to[start..].iter_mut().filter(|value| !value.is_finite()).for_each(|value| *value = 0.0);
     }
 
