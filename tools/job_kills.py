@@ -28,9 +28,8 @@ def fluxion(*arguments):
     return subprocess.run([PROGRAM, *map(str, arguments)], check=True, capture_output=True, text=True).stdout
 
 
-def plan(folder, spp, chunks, size):
-    fluxion("job", "plan", SCENES[0], "--spp", spp, "--chunks", chunks, "-o", folder, "--", "--size", size, "--method", "l2", "-q",
-            "--checkpoint-every", "0.05s")
+def plan(folder, spp, chunks, size, *options):
+    fluxion("job", "plan", SCENES[0], "--spp", spp, "--chunks", chunks, "-o", folder, "--", "--size", size, "--method", "l2", "-q", *options)
 
 
 def merged(folder):
@@ -41,7 +40,7 @@ def merged(folder):
 
 def disturbed(chance, seconds):
     """Runs a job whose processes are killed; returns the number of kills."""
-    plan("disturbed", 512, CHUNKS, "96x72")
+    plan("disturbed", 512, CHUNKS, "96x72", "--checkpoint-every", "0.05s")
     kills, running = 0, []
     while True:
         left = fluxion("job", "status", "disturbed", "--missing").strip()

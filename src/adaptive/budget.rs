@@ -16,12 +16,12 @@ pub struct Limits {
 
 /// Samples of every pixel before the first decision: one in each bin. With fewer, variances of pixels are too noisy to
 /// allocate by.
-const FIRST_SPP: u32 = 8;
+pub(super) const FIRST_SPP: u32 = 8;
 
 /// Share of a budget that the first, uniform pass takes, and number of passes that follow it. Chosen on the scenes of
 /// docs/adaptive.md, "The loop": with three passes after a quarter of the budget, errors at 48 spp are 0.55 (`apr`) and
 /// 0.62 (`frgr`) of those of even samples.
-const FIRST_SHARE: f64 = 0.25;
+pub(super) const FIRST_SHARE: f64 = 0.25;
 pub(super) const PASSES: u32 = 3;
 
 /// Share of the time that reconstructions between passes may take: less than adaptive sampling gains at equal time

@@ -13,6 +13,7 @@
 mod allocate;
 mod budget;
 mod estimate;
+mod goals;
 mod journal;
 mod predicted_error;
 mod run;
@@ -22,11 +23,12 @@ mod variance;
 use serde::{Deserialize, Serialize};
 
 pub use self::budget::Limits;
+pub use self::goals::{Goals, first_round};
 pub use self::journal::{Journal, Notes, PreviousPass};
 pub use self::run::{AdaptiveOutcome, AdaptiveSettings, Start, resume, run};
 use crate::error::{Error, Result};
 use crate::film::Frame;
-use crate::reconstruct::Solution;
+use crate::reconstruct::{Reconstruction, Solution};
 
 /// A measure of where samples are needed.
 pub trait Allocator: Sync {
@@ -53,6 +55,18 @@ pub fn allocator(id: &str) -> Result<&'static dyn Allocator> {
         let names: Vec<_> = ALLOCATORS.iter().map(|allocator| allocator.id()).collect();
         Error::Usage(format!("allocator `{id}` is not known; there are {}", names.join(", ")))
     })
+}
+
+/// Fails if a method does not estimate the errors that decisions are made by.
+pub fn check(method: &dyn Reconstruction, by_error: bool) -> Result<()> {
+    if !by_error || method.estimates_error() {
+        return Ok(());
+    }
+    Err(Error::Usage(
+        "this method does not estimate its error: nothing can be allocated or stopped by it; `fluxion info --methods` \
+         says which do, and `--adaptive variance` works with all"
+            .into(),
+    ))
 }
 
 /// Splits `apr:order=1+adaptive=variance` into a method and an allocator.

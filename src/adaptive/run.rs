@@ -3,11 +3,11 @@
 use std::sync::{Mutex, MutexGuard};
 use std::time::{Duration, Instant};
 
-use super::allocate::allocate;
 use super::budget::{Budget, FirstPass, NextPass, Spent};
+use super::goals::raised;
 use super::journal::Stage;
-use super::{Allocator, Journal, Limits, Pass, PreviousPass, uniform};
-use crate::error::{Error, Result};
+use super::{Allocator, Journal, Limits, Pass, PreviousPass, check, uniform};
+use crate::error::Result;
 use crate::film::Frame;
 use crate::reconstruct::{self, Context, Reconstruction, Solution};
 use crate::render::{Control, RenderOutcome, RenderSettings, render_to_counts};
@@ -72,13 +72,7 @@ pub fn resume(
     start: Start,
 ) -> Result<AdaptiveOutcome> {
     let by_error = settings.allocator.needs_error() || settings.limits.error.is_some();
-    if by_error && !settings.method.estimates_error() {
-        return Err(Error::Usage(
-            "this method does not estimate its error: nothing can be allocated or stopped by it; `fluxion info --methods` \
-             says which do, and `--adaptive variance` works with all"
-                .into(),
-        ));
-    }
+    check(settings.method, by_error)?;
     let Start { render, journal } = start;
     let now = Instant::now();
     let (start, times) = (now.checked_sub(render.elapsed).unwrap_or(now), Times::default());
@@ -221,9 +215,7 @@ impl Run<'_> {
 
     /// Writes down the sample counts that the pixels are to have.
     fn add_goals(&mut self, need: &[f32], samples: u64) {
-        let mut goals = self.render.film.counts();
-        let added = allocate(need, &goals, samples);
-        goals.iter_mut().zip(added).for_each(|(goal, more)| *goal += more);
+        let goals = raised(need, self.render.film.counts(), samples);
         self.journal().goals = goals;
     }
 

@@ -31,7 +31,9 @@ use serde::{Deserialize, Serialize};
 pub use self::control::{CheckpointSink, Control, SampleSink, WaveSamples};
 pub use self::gradient::{SHIFTS, Shift};
 pub use self::sampler::Sampler;
-pub use self::schedule::{Budget, RenderOutcome, RenderSettings, render, render_to_counts, resume, sample};
+pub use self::schedule::{
+    Budget, RenderOutcome, RenderSettings, render, render_to_counts, resume, resume_to_counts, sample,
+};
 pub use self::wave::Samples;
 
 /// One sample of one pixel, the same whenever and wherever it is asked for.

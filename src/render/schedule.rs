@@ -120,6 +120,21 @@ pub fn resume(scene: &Scene, settings: RenderSettings, control: &Control, mut ou
     outcome
 }
 
+/// Continues a render until each pixel has as many samples as `goals` says, row by row. The budget is ignored.
+pub fn resume_to_counts(
+    scene: &Scene,
+    settings: RenderSettings,
+    control: &Control,
+    mut outcome: RenderOutcome,
+    goals: &[u32],
+) -> RenderOutcome {
+    render_to_counts(scene, settings, control, &mut outcome, goals);
+    if let Some(sink) = control.sink {
+        sink.save(&outcome);
+    }
+    outcome
+}
+
 /// Continues until each pixel has as many samples as `goals` says, row by row. The budget is ignored.
 pub fn render_to_counts(
     scene: &Scene,

@@ -7,7 +7,7 @@ use std::process::Command;
 use std::time::Duration;
 
 use fluxion::checkpoint;
-use fluxion::film::Frame;
+use fluxion::film::{Frame, Layer};
 
 use crate::common::{self, root};
 
@@ -125,7 +125,7 @@ fn chunks_that_are_stopped_killed_damaged_or_foreign_are_told_and_healed() {
 /// A folder of programs that do what those of Slurm do, one task after the other, without a cluster.
 fn pretended_slurm(at: &Path) -> String {
     let bin = at.join("bin");
-    fs::create_dir(&bin).unwrap();
+    fs::create_dir_all(&bin).unwrap();
     let program = |name: &str, text: &str| {
         fs::write(bin.join(name), format!("#!/bin/sh\n{text}\n")).unwrap();
         fs::set_permissions(bin.join(name), fs::Permissions::from_mode(0o755)).unwrap();
@@ -143,6 +143,70 @@ done; done; echo 7"#,
     program("scontrol", "echo \"$@\" >> \"$LOG\"");
     let fluxion = assert_cmd::cargo::cargo_bin("fluxion");
     format!("{}:{}:{}", bin.display(), fluxion.parent().unwrap().display(), std::env::var("PATH").unwrap())
+}
+
+#[test]
+fn adaptive_jobs_deal_the_samples_of_a_second_round() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let cornell = scene("cornell-box");
+    let options = ["--size", "33x18", "--method", "l2", "-q"];
+    let plan = ["job", "plan", &cornell, "--spp", "96", "--chunks", "5", "--adaptive", "variance", "-o"];
+    expect(at, &[&plan[..], &["j", "--"], &options[..]].concat(), 0, "5 chunks");
+    expect(at, &["job", "status", "j", "--missing"], 0, "0\n");
+    expect(at, &["job", "status", "j"], 0, "waiting for `fluxion job deal`: 1-4");
+    expect(at, &["job", "run", "j", "1"], 2, "not dealt yet");
+    expect(at, &["job", "deal", "j"], 2, "chunks 0 of cornell-box are not complete");
+    expect(at, &["job", "run", "j", "0"], 0, "");
+    expect(at, &["job", "deal", "j"], 0, "samples a pixel");
+    expect(at, &["job", "deal", "j"], 0, "is dealt");
+    expect(at, &["job", "status", "j", "--missing"], 0, "1-4\n");
+    for chunk in ["4", "1", "3", "2"] {
+        expect(at, &["job", "run", "j", chunk], 0, "");
+        expect(at, &["job", "run", "j", chunk], 0, "is complete");
+    }
+    expect(at, &["job", "merge", "j"], 0, "96.0 samples per pixel");
+    // Samples are those of one render of these counts, from the first on.
+    let goals = "j/cornell-box.goals.exr";
+    let all = ["render", &cornell, "--goals", goals, "--spp", "9999", "--checkpoint", "all.ckpt"];
+    expect(at, &[&all[..], &options[..]].concat(), 0, "");
+    let (merged, whole) = (developed(&at.join("j/cornell-box.ckpt")), developed(&at.join("all.ckpt")));
+    for (layer, image) in whole.present() {
+        let most = image.data.iter().fold(0.0f32, |most, value| most.max(value.abs()));
+        let close = |(a, b): (&f32, &f32)| (a - b).abs() <= 1e-5 * most;
+        assert!(merged.get(layer).unwrap().data.iter().zip(&image.data).all(close), "{}", layer.name());
+    }
+    let counts = &merged.get(Layer::Samples).unwrap().data;
+    assert!(counts.iter().any(|&count| count > 120.0) && counts.iter().all(|&count| count >= 24.0 + 35.0));
+    // An image's counts will do, and those of another size will not.
+    let again = ["render", &cornell, "--goals", "j/cornell-box.exr", "--checkpoint", "again.ckpt"];
+    expect(at, &[&again[..], &options[..]].concat(), 0, "");
+    let film = |path: &str| checkpoint::load(&at.join(path)).unwrap().outcome.film;
+    assert!(film("again.ckpt").counts() == film("all.ckpt").counts());
+    let other = ["render", &cornell, "--goals", goals, "--size", "16x12", "-o", "a.exr"];
+    expect(at, &other, 1, "is of 33x18 pixels, the film of 16x12");
+
+    // By a scheduler, in one go.
+    expect(at, &[&plan[..], &["k", "--"], &options[..]].concat(), 0, "commands-2.txt");
+    let submit = |expected: &str| {
+        let mut command = Command::new("sh");
+        command.current_dir(at).arg("k/slurm.sh").env("PATH", pretended_slurm(at)).env("LOG", at.join("log"));
+        let output = command.output().unwrap();
+        let text = [&output.stdout, &output.stderr].map(|bytes| String::from_utf8_lossy(bytes).into_owned()).concat();
+        assert!(output.status.success() && text.contains(expected), "{text}");
+    };
+    submit("array 7, merge 7");
+    let log = fs::read_to_string(at.join("log")).unwrap();
+    for part in ["--array=0 ", "--array=1-4 ", "--dependency=afterok:7", "fluxion-deal", "--dependency=afterany:7"] {
+        assert!(log.contains(part), "{part}: {log}");
+    }
+    assert!(film("k/cornell-box.ckpt") == film("j/cornell-box.ckpt"));
+    submit("all chunks are complete");
+    let template: serde_json::Value = serde_json::from_slice(&fs::read(at.join("k/openjd.yaml")).unwrap()).unwrap();
+    let steps = template["steps"].as_array().unwrap();
+    let names: Vec<_> = steps.iter().map(|step| step["name"].as_str().unwrap()).collect();
+    assert_eq!(names, ["Render", "Deal", "RenderSecond", "Merge"]);
+    assert_eq!(steps[3]["dependencies"][0]["dependsOn"], "RenderSecond");
 }
 
 #[test]
@@ -219,6 +283,8 @@ fn plans_that_cannot_be_carried_out_are_refused() {
         (&["--spp", "16", "--", "--spp", "4"], "--spp"),
         (&["--spp", "16", "--", "--method", "l2", "--kernel", "structure"], "pilots of their own"),
         (&["--spp", "16", "--chunks", "0"], "--chunks"),
+        (&["--spp", "64", "--adaptive"], "two rounds take --chunks 2"),
+        (&["--spp", "64", "--chunks", "4", "--adaptive", "--", "--method", "primal"], "does not estimate its error"),
     ] {
         expect(at, &[&["job", "plan", &cornell, "-o", "j"], extra].concat(), 2, expected);
     }

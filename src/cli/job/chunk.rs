@@ -1,9 +1,12 @@
-//! The plan of a job, and its chunks: consecutive samples of one seed of a scene.
+//! The plan of a job, and its chunks: consecutive samples of one seed of a scene. Chunks of an adaptive job are of two rounds: those of the
+//! second follow those of the first of all images, and are known when these have been dealt.
 
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
 use clap::Parser;
+use fluxion::adaptive::{self, Allocator};
 use fluxion::checkpoint;
 use fluxion::error::Error;
 use fluxion::files;
@@ -40,6 +43,26 @@ pub struct Job {
     pub seed: u64,
     /// Options of `fluxion render` for all chunks.
     pub options: Vec<String>,
+    /// The first of two rounds, by whose samples those of the second are dealt.
+    #[serde(default)]
+    adaptive: Option<FirstRound>,
+    /// Folder of the job.
+    #[serde(skip)]
+    folder: PathBuf,
+    /// Of every image, the numbers of samples that divide the second round into chunks, once they are dealt.
+    #[serde(skip)]
+    dealt: Option<Vec<Vec<u32>>>,
+}
+
+/// The round of even samples of an adaptive job.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct FirstRound {
+    /// Name of the allocator that deals the second round.
+    allocator: String,
+    /// Samples of every pixel.
+    pub spp: u32,
+    /// Chunks of every image.
+    chunks: u32,
 }
 
 /// A part of the samples of an image.
@@ -49,8 +72,10 @@ pub struct Chunk {
     pub image: usize,
     /// Number of the first sample of every pixel.
     pub first: u32,
-    /// Samples of every pixel.
+    /// Samples of every pixel, or the most in a second round.
     pub spp: u32,
+    /// Whether the pixels' goals say how many.
+    dealt: bool,
 }
 
 /// State of a chunk's files.
@@ -63,12 +88,16 @@ pub enum State {
     Started,
     /// There is nothing.
     Missing,
+    /// Its samples are not dealt yet.
+    Waiting,
     /// The file of a complete chunk is damaged, or not of this chunk.
     Wrong,
 }
 
 /// Everything that decides a job.
 pub struct Settings<'a> {
+    /// Folder of the job.
+    pub folder: &'a Path,
     /// Scene files.
     pub scenes: &'a [PathBuf],
     /// First and last of the frames, if there are several.
@@ -79,35 +108,73 @@ pub struct Settings<'a> {
     pub chunks: u32,
     /// Seed of all samples.
     pub seed: u64,
+    /// Name of the allocator that deals the samples of a second round, if there are two.
+    pub adaptive: Option<&'a str>,
     /// Options of `fluxion render`.
     pub options: &'a [String],
+}
+
+impl FirstRound {
+    /// The first round of a job of so many samples and chunks an image: its chunks have about as many samples as those of the second.
+    fn new(allocator: &str, spp: u32, chunks: u32) -> Result<Self> {
+        let first = adaptive::first_round(spp);
+        if chunks < 2 || first >= spp {
+            let what = format!("two rounds take --chunks 2 and more than {first} samples a pixel, or more");
+            bail!(Error::Usage(what));
+        }
+        let share = u64::from(chunks) * u64::from(first) / u64::from(spp);
+        let chunks = (share as u32).clamp(1, first / BINS as u32);
+        Ok(Self { allocator: allocator.to_owned(), spp: first, chunks })
+    }
+
+    /// The allocator that deals the second round.
+    pub fn allocator(&self) -> Result<&'static dyn Allocator> {
+        Ok(adaptive::allocator(&self.allocator)?)
+    }
 }
 
 impl Job {
     /// A job of so many chunks an image. Chunks are of multiples of eight samples, so that bins stay whole. The scenes of all images
     /// are loaded: what is wrong with them, or with the options, is found out before any machine works.
     pub fn new(settings: &Settings) -> Result<Self> {
-        let Settings { frames, spp, seed, .. } = *settings;
+        let Settings { frames, spp, chunks: parts, seed, .. } = *settings;
         let most = spp.div_ceil(BINS as u32);
-        if settings.chunks > most {
+        if parts > most {
             let what = format!("{spp} samples make at most {most} chunks of eight: give --chunks {most} or fewer");
             bail!(Error::Usage(what));
         }
         let absolute = |path: &PathBuf| path.canonicalize().map_err(|error| Error::io(path, error));
         let scenes = settings.scenes.iter().map(absolute).collect::<Result<Vec<_>, _>>()?;
-        let (version, options) = (env!("CARGO_PKG_VERSION").to_owned(), settings.options.to_vec());
-        let contents = Vec::new();
-        let mut job =
-            Self { format: FORMAT, version, scenes, frames, contents, spp, parts: settings.chunks, seed, options };
-        for scene in 0..job.scenes.len() {
-            let name = load::name(&job.scenes[scene]);
-            if job.scenes[..scene].iter().any(|other| load::name(other) == name) {
+        for (k, scene) in scenes.iter().enumerate() {
+            let name = load::name(scene);
+            if scenes[..k].iter().any(|other| load::name(other) == name) {
                 bail!(Error::Usage(format!("two scenes are called {name}: give their files other names")));
             }
         }
+        let adaptive = settings.adaptive.map(|allocator| FirstRound::new(allocator, spp, parts)).transpose()?;
+        let (version, options) = (env!("CARGO_PKG_VERSION").to_owned(), settings.options.to_vec());
+        let (folder, contents, dealt) = (settings.folder.to_path_buf(), Vec::new(), None);
+        let mut job = Self {
+            format: FORMAT,
+            version,
+            scenes,
+            frames,
+            contents,
+            spp,
+            parts,
+            seed,
+            options,
+            adaptive,
+            folder,
+            dealt,
+        };
         for image in 0..job.images() {
-            let render = job.render(&job.chunk(image * job.parts as usize)?, Path::new("chunk.ckpt"))?;
+            let Some(chunk) = job.chunk(job.first_round(image).start)? else { continue };
+            let render = job.render(&chunk, Path::new("chunk.ckpt"))?;
             render.check_merging()?;
+            if let Some(first) = &job.adaptive {
+                render.check_allocator(first.allocator()?)?;
+            }
             job.contents.push(render.content()?);
         }
         Ok(job)
@@ -117,7 +184,7 @@ impl Job {
     pub fn load(folder: &Path) -> Result<Self> {
         let path = folder.join("job.json");
         let text = std::fs::read_to_string(&path).map_err(|error| Error::io(&path, error))?;
-        let job: Self = serde_json::from_str(&text).map_err(|error| Error::bad_data(&path, error))?;
+        let mut job: Self = serde_json::from_str(&text).map_err(|error| Error::bad_data(&path, error))?;
         if (job.format, job.version.as_str()) != (FORMAT, env!("CARGO_PKG_VERSION")) {
             bail!(Error::mismatch(
                 &path,
@@ -127,13 +194,74 @@ impl Job {
         if job.parts == 0 || job.spp == 0 || job.images() == 0 || job.contents.len() != job.images() {
             bail!(Error::mismatch(&path, "has no chunks"));
         }
+        job.folder = folder.to_path_buf();
+        let path = job.dealing();
+        if path.exists() {
+            let text = std::fs::read_to_string(&path).map_err(|error| Error::io(&path, error))?;
+            let dealt: Vec<Vec<u32>> = serde_json::from_str(&text).map_err(|error| Error::bad_data(&path, error))?;
+            let second = job.second_chunks() as usize;
+            if dealt.len() != job.images()
+                || dealt.iter().any(|bounds| bounds.len() != second + 1 || !bounds.is_sorted())
+            {
+                bail!(Error::mismatch(&path, "is of another job"));
+            }
+            job.dealt = Some(dealt);
+        }
         Ok(job)
     }
 
-    /// Writes the plan into a folder.
-    pub fn save(&self, folder: &Path) -> Result<()> {
+    /// Writes the plan into its folder.
+    pub fn save(&self) -> Result<()> {
         let text = serde_json::to_string_pretty(self)?;
-        Ok(files::write(&folder.join("job.json"), text + "\n")?)
+        Ok(files::write(&self.folder.join("job.json"), text + "\n")?)
+    }
+
+    /// Writes the numbers of samples that divide the second rounds of all images.
+    pub fn deal(&self, bounds: &[Vec<u32>]) -> Result<()> {
+        Ok(files::write(&self.dealing(), serde_json::to_string(bounds)? + "\n")?)
+    }
+
+    /// File of the second round's division.
+    fn dealing(&self) -> PathBuf {
+        self.folder.join("dealt.json")
+    }
+
+    /// The first of two rounds, if there are two.
+    pub fn adaptive(&self) -> Option<&FirstRound> {
+        self.adaptive.as_ref()
+    }
+
+    /// Whether the samples of the second round are known.
+    pub fn is_dealt(&self) -> bool {
+        self.dealt.is_some()
+    }
+
+    /// Chunks of every image in the first round.
+    fn first_chunks(&self) -> u32 {
+        self.adaptive.as_ref().map_or(self.parts, |first| first.chunks)
+    }
+
+    /// Chunks of every image in the second round.
+    pub fn second_chunks(&self) -> u32 {
+        self.parts.saturating_sub(self.first_chunks())
+    }
+
+    /// Numbers of an image's chunks in the first round.
+    pub fn first_round(&self, image: usize) -> Range<usize> {
+        let chunks = self.first_chunks() as usize;
+        image * chunks..(image + 1) * chunks
+    }
+
+    /// Numbers of an image's chunks in the second round.
+    pub fn second_round(&self, image: usize) -> Range<usize> {
+        let (before, chunks) = (self.first_round(self.images()).start, self.second_chunks() as usize);
+        before + image * chunks..before + (image + 1) * chunks
+    }
+
+    /// Numbers of all chunks in the first round, and in the second.
+    pub fn rounds(&self) -> [Range<usize>; 2] {
+        let last = self.images().saturating_sub(1);
+        [0..self.first_round(last).end, self.second_round(0).start..self.second_round(last).end]
     }
 
     /// Number of chunks.
@@ -164,22 +292,30 @@ impl Job {
         }
     }
 
-    /// A chunk by its number.
-    pub fn chunk(&self, number: usize) -> Result<Chunk> {
-        if number >= self.chunks() {
+    /// A chunk by its number, unless it is not dealt yet.
+    pub fn chunk(&self, number: usize) -> Result<Option<Chunk>> {
+        let [first, second] = self.rounds();
+        if second.contains(&number) {
+            let chunks = self.second_chunks() as usize;
+            let (image, part) = ((number - second.start) / chunks, (number - second.start) % chunks);
+            let bounds = self.dealt.as_ref().map(|dealt| (dealt[image][part], dealt[image][part + 1]));
+            return Ok(bounds.map(|(start, end)| Chunk { image, first: start, spp: end - start, dealt: true }));
+        }
+        if !first.contains(&number) {
             bail!(Error::Usage(format!("there is no chunk {number}: there are {}, from 0 on", self.chunks())));
         }
-        let (image, part) = (number / self.parts as usize, (number % self.parts as usize) as u64);
+        let (spp, chunks) = (self.adaptive.as_ref().map_or(self.spp, |first| first.spp), self.first_chunks());
+        let (image, part) = (number / chunks as usize, (number % chunks as usize) as u64);
         let start = |part: u64| {
-            let eights = u64::from(self.spp.div_ceil(BINS as u32)) * part / u64::from(self.parts);
-            (BINS as u64 * eights).min(u64::from(self.spp)) as u32
+            let eights = u64::from(spp.div_ceil(BINS as u32)) * part / u64::from(chunks);
+            (BINS as u64 * eights).min(u64::from(spp)) as u32
         };
-        Ok(Chunk { image, first: start(part), spp: start(part + 1) - start(part) })
+        Ok(Some(Chunk { image, first: start(part), spp: start(part + 1) - start(part), dealt: false }))
     }
 
     /// The command that renders a chunk into a checkpoint.
     pub fn render(&self, chunk: &Chunk, checkpoint: &Path) -> Result<Box<render::Args>> {
-        let &Chunk { image, first, spp } = chunk;
+        let &Chunk { image, first, spp, dealt } = chunk;
         let (scene, frame) = self.image(image);
         let option = |name: &str, value: String| [name.to_owned(), value];
         let mut line = vec!["fluxion".to_owned(), "render".to_owned(), scene.display().to_string()];
@@ -190,6 +326,7 @@ impl Job {
         line.push("--resume".to_owned());
         line.extend(frame.into_iter().flat_map(|frame| option("-D", format!("frame={frame}"))));
         line.extend(self.contents.get(image).into_iter().flat_map(|known| option("--content", known.clone())));
+        line.extend(dealt.then(|| option("--goals", self.goals(image).display().to_string())).into_iter().flatten());
         line.extend(self.options.iter().cloned());
         match Args::try_parse_from(line) {
             Ok(Args { command: Command::Render(args), .. }) => Ok(args),
@@ -197,25 +334,45 @@ impl Job {
             Err(error) => bail!(Error::Usage(format!("options of the chunks: {error}"))),
         }
     }
-}
-
-/// The checkpoint of a complete chunk.
-pub fn complete(folder: &Path, number: usize) -> PathBuf {
-    folder.join(format!("{number:04}.ckpt"))
-}
-
-/// The checkpoint of a chunk that is not complete.
-pub fn unfinished(folder: &Path, number: usize) -> PathBuf {
-    folder.join(format!("{number:04}.part.ckpt"))
-}
-
-/// State of a chunk, by the headers of its files, or by all of their bytes.
-pub fn state(job: &Job, folder: &Path, number: usize, verify: bool) -> Result<State> {
-    let (chunk, path) = (job.chunk(number)?, complete(folder, number));
-    if !path.exists() {
-        return Ok(if unfinished(folder, number).exists() { State::Started } else { State::Missing });
+    /// File of the sample counts that an image's pixels are to have.
+    pub fn goals(&self, image: usize) -> PathBuf {
+        self.folder.join(format!("{}.goals.exr", self.name(image)))
     }
-    let fits = |found: checkpoint::Summary| matches!(found.origin.runs.as_slice(), [run] if (run.seed, run.first, run.samples) == (job.seed, chunk.first, chunk.spp));
-    let whole = checkpoint::summary(&path).is_ok_and(fits) && (!verify || checkpoint::verify(&path).is_ok());
-    Ok(if whole { State::Complete } else { State::Wrong })
+
+    /// The checkpoint of a complete chunk.
+    pub fn complete(&self, number: usize) -> PathBuf {
+        self.folder.join(format!("{number:04}.ckpt"))
+    }
+
+    /// The checkpoint of a chunk that is not complete.
+    pub fn unfinished(&self, number: usize) -> PathBuf {
+        self.folder.join(format!("{number:04}.part.ckpt"))
+    }
+
+    /// State of a chunk, by the headers of its files, or by all of their bytes.
+    pub fn state(&self, number: usize, verify: bool) -> Result<State> {
+        let Some(chunk) = self.chunk(number)? else { return Ok(State::Waiting) };
+        let path = self.complete(number);
+        if chunk.spp == 0 {
+            return Ok(State::Complete);
+        }
+        if !path.exists() {
+            return Ok(if self.unfinished(number).exists() { State::Started } else { State::Missing });
+        }
+        let fits = |found: checkpoint::Summary| matches!(found.origin.runs.as_slice(), [run] if (run.seed, run.first, run.samples) == (self.seed, chunk.first, chunk.spp));
+        let whole = checkpoint::summary(&path).is_ok_and(fits) && (!verify || checkpoint::verify(&path).is_ok());
+        Ok(if whole { State::Complete } else { State::Wrong })
+    }
+
+    /// The films of some chunks that are complete, and the numbers of those that are not.
+    pub fn films(&self, numbers: impl IntoIterator<Item = usize>) -> Result<(Vec<PathBuf>, Vec<usize>)> {
+        let (mut films, mut left) = (Vec::new(), Vec::new());
+        for number in numbers {
+            match self.state(number, false)? {
+                State::Complete => films.extend(Some(self.complete(number)).filter(|path| path.exists())),
+                _ => left.push(number),
+            }
+        }
+        Ok((films, left))
+    }
 }

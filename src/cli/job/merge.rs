@@ -8,7 +8,7 @@ use clap::Parser;
 use fluxion::checkpoint;
 use fluxion::error::Error;
 
-use super::chunk::{self, Job, State};
+use super::chunk::Job;
 use super::status::ranges;
 use crate::cli::terminal::{note, out};
 use crate::cli::{Args as CliArgs, Command, reconstruct};
@@ -30,15 +30,7 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<ExitCode> {
     let job = Job::load(&args.job)?;
     for image in 0..job.images() {
-        let parts = job.parts as usize;
-        let numbers = image * parts..(image + 1) * parts;
-        let (mut films, mut left) = (Vec::new(), Vec::new());
-        for number in numbers {
-            match chunk::state(&job, &args.job, number, false)? {
-                State::Complete => films.push(chunk::complete(&args.job, number)),
-                _ => left.push(number),
-            }
-        }
+        let (films, left) = job.films(job.first_round(image).chain(job.second_round(image)))?;
         let name = job.name(image);
         if !left.is_empty() {
             let what = format!("chunks {} of {name} are not complete", ranges(&left));

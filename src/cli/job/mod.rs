@@ -3,9 +3,12 @@
 //!
 //! ```text
 //! plan --job.json--> run 0, 1, 2, ... (on any machine) --checkpoints--> status, merge --> images
+//!                     ^                                        |
+//!                     +---- goals of a second round ---- deal <+
 //! ```
 
 mod chunk;
+mod deal;
 mod merge;
 mod plan;
 mod run;
@@ -36,6 +39,11 @@ enum Command {
         /// Number of the chunk, from 0 on
         chunk: usize,
     },
+    /// Allocate the samples of an adaptive job's second round, when the first is complete
+    Deal {
+        /// Folder of the job
+        job: PathBuf,
+    },
     /// Say which chunks are complete
     Status(status::Args),
     /// Add up the chunks of every image, and reconstruct it
@@ -47,6 +55,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     match &args.command {
         Command::Plan(args) => plan::run(args),
         Command::Run { job, chunk } => run::run(job, *chunk),
+        Command::Deal { job } => deal::run(job),
         Command::Status(args) => status::run(args),
         Command::Merge(args) => merge::run(args),
     }

@@ -4,10 +4,12 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
+use fluxion::adaptive::ALLOCATORS;
 use fluxion::error::Error;
 
 use super::chunk::{Job, Settings};
 use super::schedulers;
+use crate::cli::render;
 use crate::cli::terminal::out;
 
 /// Options of `job plan`.
@@ -28,6 +30,9 @@ pub struct Args {
     /// Chunks of every image
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     chunks: u32,
+    /// Take a quarter of the samples first, by which an allocator deals the others, in a second round
+    #[arg(long, value_name = "ALLOCATOR", num_args = 0..=1, default_missing_value = ALLOCATORS[0].id(), value_parser = render::allocator_names())]
+    adaptive: Option<String>,
     /// Seed of the random numbers
     #[arg(long, default_value_t = 0)]
     seed: u64,
@@ -51,11 +56,14 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         bail!(Error::Usage(format!("{} has a job already: take another folder", folder.display())));
     }
     let Args { frames, spp, chunks, seed, .. } = *args;
-    let job = Job::new(&Settings { scenes: &args.scenes, frames, spp, chunks, seed, options: &args.options })?;
+    let Args { scenes, options, adaptive, .. } = args;
+    let adaptive = adaptive.as_deref();
+    let job = Job::new(&Settings { folder, scenes, frames, spp, chunks, seed, adaptive, options })?;
     std::fs::create_dir_all(folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
     let absolute = folder.canonicalize().map_err(|error| Error::io(folder, error))?;
-    schedulers::write(folder, &absolute, job.chunks())?;
-    job.save(folder)?;
-    out!("{}: {} chunks; each line of commands.txt renders one", folder.display(), job.chunks())?;
+    schedulers::write(folder, &absolute, &job.rounds())?;
+    job.save()?;
+    let second = if job.adaptive().is_some() { ", after `fluxion job deal` each of commands-2.txt" } else { "" };
+    out!("{}: {} chunks; each line of commands.txt renders one{second}", folder.display(), job.chunks())?;
     Ok(ExitCode::SUCCESS)
 }

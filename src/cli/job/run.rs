@@ -6,25 +6,27 @@ use std::process::ExitCode;
 use anyhow::{Result, bail};
 use fluxion::error::Error;
 
-use super::chunk::{self, Job, State};
+use super::chunk::{Job, State};
 use crate::cli::terminal::note;
 use crate::cli::{interrupt, render};
 
 /// Renders a chunk. It may be run any number of times: what is complete is left alone, what was interrupted is resumed.
 pub fn run(folder: &Path, number: usize) -> Result<ExitCode> {
     let job = Job::load(folder)?;
-    let (part, whole) = (chunk::unfinished(folder, number), chunk::complete(folder, number));
-    match chunk::state(&job, folder, number, false)? {
-        State::Complete => {
-            note!("chunk {number} is complete");
-            return Ok(ExitCode::SUCCESS);
-        }
-        State::Wrong => {
-            bail!(Error::mismatch(&whole, "is no checkpoint of this chunk: remove it, and run the chunk again"))
-        }
-        State::Started | State::Missing => {}
+    let (part, whole) = (job.unfinished(number), job.complete(number));
+    let state = job.state(number, false)?;
+    if state == State::Complete {
+        note!("chunk {number} is complete");
+        return Ok(ExitCode::SUCCESS);
     }
-    let code = render::run(&*job.render(&job.chunk(number)?, &part)?)?;
+    if state == State::Wrong {
+        bail!(Error::mismatch(&whole, "is no checkpoint of this chunk: remove it, and run the chunk again"))
+    }
+    let Some(chunk) = job.chunk(number)? else {
+        let what = format!("the samples of chunk {number} are not dealt yet: run those of the first round, then");
+        bail!(Error::Usage(format!("{what} `fluxion job deal {}`", folder.display())));
+    };
+    let code = render::run(&*job.render(&chunk, &part)?)?;
     if interrupt::stopped().is_none() {
         std::fs::rename(&part, &whole).map_err(|error| Error::io(&whole, error))?;
     }

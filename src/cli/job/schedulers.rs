@@ -1,38 +1,46 @@
 //! Files by which schedulers run the chunks of a job: a list of commands, a script for Slurm, a template of Open Job Description.
 
+use std::ops::Range;
 use std::path::Path;
 
 use anyhow::Result;
 use fluxion::files;
 use serde_json::json;
 
+use super::status::ranges;
+
 /// Seconds from the request to stop to the kill: enough for running tiles and a checkpoint.
 const GRACE: u32 = 120;
 
-/// Writes all of them into the folder of a job, whose absolute path is `job`.
-pub fn write(folder: &Path, job: &Path, chunks: usize) -> Result<()> {
+/// Writes all of them into the folder of a job, whose absolute path is `job`, with the numbers of the chunks of one round or of two.
+pub fn write(folder: &Path, job: &Path, rounds: &[Range<usize>; 2]) -> Result<()> {
     let quoted = format!("'{}'", job.display().to_string().replace('\'', r"'\''"));
-    let command = |number| format!("fluxion job run {quoted} {number}\n");
-    files::write(&folder.join("commands.txt"), (0..chunks).map(command).collect::<String>())?;
-    files::write(&folder.join("slurm.sh"), slurm(&quoted, chunks))?;
-    Ok(files::write(&folder.join("openjd.yaml"), openjd(job, chunks)?)?)
+    for (round, name) in rounds.iter().zip(["commands.txt", "commands-2.txt"]).filter(|(round, _)| !round.is_empty()) {
+        let command = |number| format!("fluxion job run {quoted} {number}\n");
+        files::write(&folder.join(name), round.clone().map(command).collect::<String>())?;
+    }
+    files::write(&folder.join("slurm.sh"), slurm(&quoted, rounds))?;
+    Ok(files::write(&folder.join("openjd.yaml"), openjd(job, rounds)?)?)
 }
 
-/// Submits an array of all chunks that are not complete, and a merge when it has ended. A chunk that was stopped is queued again.
-fn slurm(job: &str, chunks: usize) -> String {
+/// Submits an array of all chunks that are not complete, and a merge when it has ended. A chunk that was stopped is queued again. Of two
+/// rounds the second waits until its samples have been dealt.
+fn slurm(job: &str, rounds: &[Range<usize>; 2]) -> String {
+    let chunks = rounds[1].end;
+    let second = if rounds[1].is_empty() { String::new() } else { second_round(&rounds[1]) };
     format!(
         r#"#!/bin/sh
 # Submits the {chunks} chunks of this job as an array, as far as they are not complete, and their merge after it. Options are those of
 # sbatch, for the array: sh slurm.sh --partition=render --cpus-per-task=16 --time=1:00:00
 set -eu
 job={job}
-missing=$(fluxion job status --missing "$job")
-if [ -z "$missing" ]; then
-	echo "all chunks are complete: fluxion job merge $job"
-	exit
-fi
-array=$(sbatch --parsable --job-name=fluxion --array="$missing" --requeue --signal=TERM@{GRACE} --open-mode=append \
-	--output="$job/slurm-%a.log" "$@" <<'EOF'
+
+# chunks NUMBERS [OPTION...]: number of the array that renders them.
+chunks() {{
+	numbers=$1
+	shift
+	sbatch --parsable --job-name=fluxion --array="$numbers" --requeue --signal=TERM@{GRACE} --open-mode=append \
+		--output="$job/slurm-%a.log" "$@" <<'EOF'
 #!/bin/sh
 srun fluxion job run {job} "$SLURM_ARRAY_TASK_ID"
 code=$?
@@ -42,37 +50,79 @@ if [ $code = 75 ]; then
 fi
 exit $code
 EOF
-)
-merge=$(sbatch --parsable --job-name=fluxion-merge --dependency=afterany:"${{array%%;*}}" --open-mode=append --output="$job/slurm-merge.log" <<'EOF'
+}}
+
+# step NAME [OPTION...]: number of the task that carries out `fluxion job NAME`.
+step() {{
+	name=$1
+	shift
+	FLUXION_STEP="$name" sbatch --parsable --job-name="fluxion-$name" --open-mode=append --output="$job/slurm-$name.log" "$@" <<'EOF'
 #!/bin/sh
-exec srun fluxion job merge --partial {job}
+case $FLUXION_STEP in
+deal) exec srun fluxion job deal {job} ;;
+merge) exec srun fluxion job merge --partial {job} ;;
+esac
 EOF
-)
+}}
+
+missing=$(fluxion job status --missing "$job")
+{second}if [ -z "$missing" ]; then
+	echo "all chunks are complete: fluxion job merge $job"
+	exit
+fi
+array=$(chunks "$missing" "$@")
+merge=$(step merge --dependency=afterany:"${{array%%;*}}")
 echo "array $array, merge $merge"
 "#
     )
 }
 
-/// A template with a task for every chunk, and a step that merges them.
-fn openjd(job: &Path, chunks: usize) -> Result<String> {
+/// The part of the script that renders a first round and deals the second, unless that has been done.
+fn second_round(round: &Range<usize>) -> String {
+    format!(
+        r#"if [ ! -e "$job/dealt.json" ]; then
+	if [ -n "$missing" ]; then
+		first=$(chunks "$missing" "$@")
+		deal=$(step deal --dependency=afterany:"${{first%%;*}}")
+	else
+		deal=$(step deal)
+	fi
+	missing={}
+	set -- "$@" --dependency=afterok:"${{deal%%;*}}" --kill-on-invalid-dep=yes
+fi
+"#,
+        range(round)
+    )
+}
+
+/// Numbers as schedulers take them.
+fn range(numbers: &Range<usize>) -> String {
+    ranges(&numbers.clone().collect::<Vec<_>>())
+}
+
+/// A template with a task for every chunk, and a step that merges them; of two rounds with one that deals the second.
+fn openjd(job: &Path, rounds: &[Range<usize>; 2]) -> Result<String> {
     let script = |words: &[&str], chunk: Option<&str>| {
         let job = job.display().to_string();
         let args: Vec<_> = words.iter().copied().chain([job.as_str()]).chain(chunk).collect();
         let cancelation = json!({"mode": "NOTIFY_THEN_TERMINATE", "notifyPeriodInSeconds": GRACE});
         json!({"actions": {"onRun": {"command": "fluxion", "args": args, "cancelation": cancelation}}})
     };
-    let last = chunks.saturating_sub(1);
-    let range = if last == 0 { "0".to_owned() } else { format!("0-{last}") };
-    let parameters = json!({"taskParameterDefinitions": [{"name": "Chunk", "type": "INT", "range": range}]});
-    let render = script(&["job", "run"], Some("{{Task.Param.Chunk}}"));
-    let template = json!({
-        "specificationVersion": "jobtemplate-2023-09",
-        "name": "fluxion",
-        "steps": [
-            {"name": "Render", "parameterSpace": parameters, "script": render},
-            {"name": "Merge", "dependencies": [{"dependsOn": "Render"}], "script": script(&["job", "merge"], None)},
-        ],
-    });
+    let render = |name: &str, round: &Range<usize>| {
+        let parameters = json!({"taskParameterDefinitions": [{"name": "Chunk", "type": "INT", "range": range(round)}]});
+        let run = script(&["job", "run"], Some("{{Task.Param.Chunk}}"));
+        json!({"name": name, "parameterSpace": parameters, "script": run})
+    };
+    let mut steps = vec![render("Render", &rounds[0])];
+    if !rounds[1].is_empty() {
+        steps.push(json!({"name": "Deal", "script": script(&["job", "deal"], None)}));
+        steps.push(render("RenderSecond", &rounds[1]));
+    }
+    steps.push(json!({"name": "Merge", "script": script(&["job", "merge"], None)}));
+    for k in 1..steps.len() {
+        steps[k]["dependencies"] = json!([{"dependsOn": steps[k - 1]["name"]}]);
+    }
+    let template = json!({"specificationVersion": "jobtemplate-2023-09", "name": "fluxion", "steps": steps});
     // JSON is YAML.
     Ok(serde_json::to_string_pretty(&template)? + "\n")
 }

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use anyhow::Result;
 use serde::Serialize;
 
-use super::chunk::{self, Job, State};
+use super::chunk::{Job, State};
 use crate::cli::terminal::out;
 
 /// Options of `job status`.
@@ -14,7 +14,7 @@ use crate::cli::terminal::out;
 pub struct Args {
     /// Folder of the job
     job: PathBuf,
-    /// Print only the numbers of the chunks that are not complete, as in 3,17,200-203
+    /// Print only the numbers of the chunks that are not complete and can be run, as in 3,17,200-203
     #[arg(long, conflicts_with = "json")]
     missing: bool,
     /// Read the files of complete chunks from end to end
@@ -32,6 +32,7 @@ struct Status {
     complete: usize,
     started: Vec<usize>,
     missing: Vec<usize>,
+    waiting: Vec<usize>,
     wrong: Vec<usize>,
 }
 
@@ -40,10 +41,11 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let job = Job::load(&args.job)?;
     let mut status = Status { chunks: job.chunks(), ..Status::default() };
     for number in 0..job.chunks() {
-        match chunk::state(&job, &args.job, number, args.verify)? {
+        match job.state(number, args.verify)? {
             State::Complete => status.complete += 1,
             State::Started => status.started.push(number),
             State::Missing => status.missing.push(number),
+            State::Waiting => status.waiting.push(number),
             State::Wrong => status.wrong.push(number),
         }
     }
@@ -58,9 +60,13 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         return Ok(ExitCode::SUCCESS);
     }
     out!("{} of {} chunks are complete", status.complete, status.chunks)?;
-    for (what, numbers) in
-        [("started", &status.started), ("missing", &status.missing), ("damaged or foreign", &status.wrong)]
-    {
+    let Status { started, missing, waiting, wrong, .. } = &status;
+    for (what, numbers) in [
+        ("started", started),
+        ("missing", missing),
+        ("waiting for `fluxion job deal`", waiting),
+        ("damaged or foreign", wrong),
+    ] {
         if !numbers.is_empty() {
             out!("{what}: {}", ranges(numbers))?;
         }

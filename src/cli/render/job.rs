@@ -26,6 +26,7 @@ pub struct Job<'a> {
     pub scene: &'a Scene,
     pub method: &'a dyn Reconstruction,
     pub kernel: Selector,
+    pub goals: Option<Vec<u32>>,
     pub sink: Option<&'a CheckpointWriter<'a>>,
 }
 
@@ -80,7 +81,7 @@ impl Job<'_> {
         done
     }
 
-    /// The same number of samples for every pixel.
+    /// The same number of samples for every pixel, or as many as are its goal.
     fn straight(&self, start: Start, stats: &mut Stats) -> Result<Rendered> {
         let args = self.args;
         let spp = args.spp.unwrap_or(self.scene.sensor().spp);
@@ -90,7 +91,10 @@ impl Job<'_> {
         let settings = self.settings(start.render.film.needs, budget);
         let outcome = self.controlled(|control| {
             let control = Control { samples: writer.as_ref().map(|writer| writer as &dyn SampleSink), ..*control };
-            Ok(render::resume(self.scene, settings, &control, start.render))
+            Ok(match &self.goals {
+                Some(goals) => render::resume_to_counts(self.scene, settings, &control, start.render, goals),
+                None => render::resume(self.scene, settings, &control, start.render),
+            })
         })?;
         self.warn(&outcome);
         stats.rendered(&outcome);

@@ -9,12 +9,13 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Result, bail};
 use clap::builder::{PossibleValue, PossibleValuesParser};
-use fluxion::adaptive::{ALLOCATORS, Allocator, Start};
+use fluxion::adaptive::{self, ALLOCATORS, Allocator, Goals, Start};
 use fluxion::checkpoint::{Origin, Run, content};
 use fluxion::error::Error;
 use fluxion::film::Needs;
 use fluxion::neighbours::Selector;
 use fluxion::plan::Plan;
+use fluxion::reconstruct;
 use fluxion::reference::fingerprint;
 use fluxion::render::{self, RenderOutcome, SHIFTS, SampleId, Shift};
 use fluxion::scene::{Scene, load};
@@ -55,6 +56,10 @@ pub struct Args {
     /// together than films of different seeds
     #[arg(long, default_value_t = 0, hide_short_help = true, value_name = "N")]
     first: u32,
+    /// Samples that every pixel is to have, as an EXR file with a channel `samples`, such as another render's image: numbers
+    /// from --first on, at most --spp of them
+    #[arg(long, conflicts_with_all = ["time", "adaptive", "target_error", "samples"], hide_short_help = true, value_name = "FILE")]
+    goals: Option<PathBuf>,
     /// Fail unless the scene and the files that it names have this checksum
     #[arg(long, hide = true, requires = "checkpoint", value_name = "CHECKSUM")]
     content: Option<String>,
@@ -124,6 +129,12 @@ impl Args {
     /// Checksum of the scene and the files that it names.
     pub fn content(&self) -> Result<String> {
         Ok(content(&self.load()?)?)
+    }
+
+    /// Fails if the method does not estimate what an allocator needs.
+    pub fn check_allocator(&self, allocator: &dyn Allocator) -> Result<()> {
+        let method = reconstruct::parse(&self.method.method)?;
+        Ok(adaptive::check(method.as_ref(), allocator.needs_error())?)
     }
 
     /// Fails if films that are rendered so with different samples cannot be merged.
@@ -202,19 +213,33 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     if origin.as_ref().is_some_and(|origin| args.content.as_ref().is_some_and(|known| origin.content != *known)) {
         bail!(Error::mismatch(&args.scene, "has changed since the plan was made, or a file that it names: plan anew"));
     }
+    let goals = goals(args, &scene)?;
     let journal = Mutex::default();
     let start = match origin.as_ref().map(|origin| args.checkpoint.load(origin)).transpose()?.flatten() {
         Some(checkpoint) => checkpoint.resume(&journal),
         None => Start { render: RenderOutcome::new(&scene, plan.needs), journal: &journal },
     };
     let sink = origin.zip(lock).and_then(|(origin, lock)| args.checkpoint.sink(origin, &start, lock));
-    let done = Job { args, scene: &scene, method: method.as_ref(), kernel, sink: sink.as_ref() }.run(start, &mut stats);
+    let done =
+        Job { args, scene: &scene, method: method.as_ref(), kernel, goals, sink: sink.as_ref() }.run(start, &mut stats);
     match &sink {
         Some(sink) => sink.conclude(done)?,
         None => done?,
     }
     report(args, &stats);
     Ok(ExitCode::SUCCESS)
+}
+
+/// Sample counts that the film's pixels are to have, if a file says.
+fn goals(args: &Args, scene: &Scene) -> Result<Option<Vec<u32>>> {
+    let Some(path) = &args.goals else { return Ok(None) };
+    let goals = Goals::load(path)?;
+    let (width, height) = (scene.sensor().width, scene.sensor().height);
+    if goals.size != (width, height) {
+        let (columns, rows) = goals.size;
+        bail!(Error::mismatch(path, format!("is of {columns}x{rows} pixels, the film of {width}x{height}")));
+    }
+    Ok(Some(goals.of_chunk(args.first, args.spp)))
 }
 
 /// Statistics that are to be saved, for a method with these needs.
@@ -251,7 +276,8 @@ fn origin(args: &Args, scene: &Scene, plan: &Plan, kernel: Selector) -> Result<O
     })
 }
 
-fn allocator_names() -> PossibleValuesParser {
+/// Names of allocators, as values of options.
+pub fn allocator_names() -> PossibleValuesParser {
     let name = |allocator: &&dyn Allocator| PossibleValue::new(allocator.id()).help(allocator.summary());
     ALLOCATORS.iter().map(name).collect::<Vec<_>>().into()
 }
