@@ -20,6 +20,7 @@ mod run;
 mod uniform;
 mod variance;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use self::budget::Limits;
@@ -27,7 +28,7 @@ pub use self::goals::{Goals, first_round};
 pub use self::journal::{Journal, Notes, PreviousPass};
 pub use self::run::{AdaptiveOutcome, AdaptiveSettings, Start, resume, run};
 use crate::error::{Error, Result};
-use crate::film::Frame;
+use crate::film::{Frame, Needs};
 use crate::reconstruct::{Reconstruction, Solution};
 
 /// A measure of where samples are needed.
@@ -40,6 +41,11 @@ pub trait Allocator: Sync {
 
     /// Whether it needs a reconstruction with an estimated error.
     fn needs_error(&self) -> bool;
+
+    /// Statistics that it uses, if the film records them, besides the colours.
+    fn needs(&self) -> Needs {
+        Needs::default()
+    }
 
     /// For every pixel the standard deviation of a single sample, in any unit: the best number of samples is proportional
     /// to it (Neyman 1934). `solution` is there if [`Allocator::needs_error`].
@@ -79,7 +85,7 @@ pub fn parse(text: &str) -> Result<(&str, Option<&'static dyn Allocator>)> {
 }
 
 /// A pass that has ended.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(JsonSchema, Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Pass {
     /// Mean samples per pixel after it.
     pub spp: f64,

@@ -47,7 +47,7 @@ pub struct AdaptiveOutcome {
 pub struct Start<'a> {
     /// The film so far.
     pub render: RenderOutcome,
-    /// The decisions so far. A [`CheckpointSink`](crate::render::CheckpointSink) finds it in step with the film.
+    /// The decisions so far. A [`FilmSink`](crate::render::FilmSink) finds it in step with the film.
     pub journal: &'a Mutex<Journal>,
 }
 
@@ -141,9 +141,7 @@ impl Run<'_> {
             self.allocate_pass(&need, pass);
             state = self.finish_pass()?;
         }
-        if let Some(sink) = self.control.sink {
-            sink.save(&self.render);
-        }
+        self.control.conclude(&self.render);
         let Evaluation { frame, solution, guided, .. } = state;
         let solution = solution.filter(|_| !guided).map_or_else(|| self.solve(&frame, false), Ok)?;
         let passes = self.journal().notes.passes.clone();

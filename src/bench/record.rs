@@ -3,12 +3,13 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
 
 /// Wall-clock seconds of the stages of a run.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(JsonSchema, Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Seconds {
     /// Reading the scene and building the hierarchy, once for all runs; not part of the total.
     pub load: f64,
@@ -23,7 +24,7 @@ pub struct Seconds {
 }
 
 /// One run.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(JsonSchema, Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Record {
     /// Name of the scene.
     pub scene: String,
@@ -76,7 +77,7 @@ impl Record {
 }
 
 /// A run that was not worth starting, or failed.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(JsonSchema, Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LeftOut {
     /// Name of the scene.
     pub scene: String,
@@ -89,7 +90,7 @@ pub struct LeftOut {
 }
 
 /// All runs so far.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(JsonSchema, Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Results {
     /// Runs that were made.
     pub records: Vec<Record>,

@@ -139,12 +139,12 @@ impl CheckpointWriter<'_> {
     }
 }
 
-impl render::CheckpointSink for CheckpointWriter<'_> {
+impl render::FilmSink for CheckpointWriter<'_> {
     fn due(&self) -> bool {
         Instant::now() >= self.state().next
     }
 
-    fn save(&self, outcome: &RenderOutcome) {
+    fn put(&self, outcome: &RenderOutcome) {
         let failed = self.write(outcome).err();
         if let Some(error) = &failed {
             note!("warning: no new checkpoint: {error}");

@@ -16,12 +16,16 @@ mod reconstruct;
 mod reference;
 mod render;
 mod scene;
+mod schema;
+mod shell;
 mod stats;
 mod stored;
 mod stress;
 pub mod terminal;
 mod validate;
+mod viewer;
 
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Once;
 use std::time::Duration;
@@ -64,6 +68,23 @@ enum Command {
     Stress(stress::Args),
     /// Render bundled scenes and check them against their references
     Validate(validate::Args),
+    /// Print a script that completes this program's commands and options in a shell
+    Completions {
+        /// Shell that is to complete them
+        shell: clap_complete::Shell,
+    },
+    /// Write manual pages of all commands
+    Man {
+        /// Folder for them
+        #[arg(short, long, value_name = "DIR")]
+        output: PathBuf,
+    },
+    /// Print the JSON Schema of what is written as JSON
+    Schema {
+        /// Kind of JSON
+        #[arg(value_enum)]
+        kind: schema::Kind,
+    },
 }
 
 /// Runs a command. The exit code is 1 for a check that failed; for work that a signal has stopped it is 75 if a checkpoint holds
@@ -82,6 +103,9 @@ pub fn run(args: Args) -> Result<ExitCode> {
         Command::Info(args) => info::run(&args),
         Command::Stress(args) => stress::run(&args),
         Command::Validate(args) => validate::run(&args),
+        Command::Completions { shell } => shell::completions(shell),
+        Command::Man { output } => shell::manual(&output),
+        Command::Schema { kind } => schema::run(kind),
     }?;
     Ok(interrupt::stopped().unwrap_or(code))
 }

@@ -5,6 +5,8 @@ use std::sync::{Mutex, OnceLock};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use super::terminal::{note, out};
 
@@ -45,6 +47,19 @@ struct Lines {
     start: Instant,
     /// When the next line is due.
     next: Instant,
+}
+
+/// A line of progress for programs.
+#[derive(JsonSchema, Serialize)]
+pub struct Line {
+    /// Work that is under way.
+    stage: String,
+    /// Share of it that is done, from 0 to 1.
+    share: f32,
+    /// Seconds that it has taken.
+    seconds: f64,
+    /// Seconds that are left at the same speed.
+    left: f64,
 }
 
 const STEPS: u64 = 1000;
@@ -112,8 +127,8 @@ impl Lines {
         // Nobody may be reading, which is no reason to stop.
         let _ = match self.style {
             Style::Json => {
-                let line = serde_json::json!({ "stage": self.stage, "share": share, "seconds": elapsed, "left": left });
-                note!("{line}");
+                let line = Line { stage: self.stage.clone(), share, seconds: elapsed, left };
+                note!("{}", serde_json::to_string(&line).unwrap_or_default());
                 Ok(())
             }
             Style::Alf => out!("ALF_PROGRESS {percent}%"),

@@ -5,12 +5,13 @@ use std::path::Path;
 use anyhow::Result;
 use fluxion::adaptive::Pass;
 use fluxion::render::RenderOutcome;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::outputs::write_json;
 
 /// Wall-clock seconds of the stages.
-#[derive(Clone, Copy, Debug, Default, Serialize)]
+#[derive(JsonSchema, Clone, Copy, Debug, Default, Serialize)]
 pub struct Seconds {
     /// Reading the scene or the layers, building the hierarchy.
     pub load: f64,
@@ -25,7 +26,7 @@ pub struct Seconds {
 }
 
 /// The object that `--json` writes.
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(JsonSchema, Clone, Debug, Default, Serialize)]
 pub struct Stats {
     /// Time per stage.
     pub seconds: Seconds,

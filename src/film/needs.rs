@@ -1,12 +1,13 @@
 //! Statistics that a film records: asked for by methods, decided by the plan.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::statistic::STATISTICS;
 use super::tile::CROSS;
 
 /// Statistics that a method asks for besides the colour, or that a film records.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(JsonSchema, Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Needs {
     /// Albedo, normal and depth with their variances.
     pub features: bool,
@@ -26,7 +27,7 @@ pub struct Needs {
 }
 
 /// How a film gets the differences between pixels.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(JsonSchema, Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum EdgeNeed {
     /// There are none.

@@ -6,13 +6,13 @@ use super::schedule::RenderOutcome;
 use super::wave::Samples;
 use crate::math::Vec2;
 
-/// Receives checkpoints of a render.
-pub trait CheckpointSink: Sync {
-    /// Whether the next checkpoint is due; called between tiles.
+/// Receives the film of a render from time to time: writes checkpoints, or shows it.
+pub trait FilmSink: Sync {
+    /// Whether it wants the film now; called between tiles.
     fn due(&self) -> bool;
 
-    /// Saves a checkpoint; called while no tile is being rendered, and at the end of the render.
-    fn save(&self, outcome: &RenderOutcome);
+    /// Takes the film; called while no tile is being rendered, and at the end of the render.
+    fn put(&self, outcome: &RenderOutcome);
 }
 
 /// One sample of each of some pixels.
@@ -40,8 +40,8 @@ pub struct Control<'a> {
     pub stop: &'a AtomicBool,
     /// Called with the finished share, in [0, 1].
     pub progress: &'a (dyn Fn(f32) + Sync),
-    /// Receiver of checkpoints.
-    pub sink: Option<&'a dyn CheckpointSink>,
+    /// Receivers of the film.
+    pub sinks: &'a [&'a dyn FilmSink],
     /// Receiver of single samples.
     pub samples: Option<&'a dyn SampleSink>,
 }
@@ -50,6 +50,11 @@ pub struct Control<'a> {
 static NEVER: AtomicBool = AtomicBool::new(false);
 
 impl Control<'_> {
+    /// Hands a film whose render has ended to all receivers.
+    pub fn conclude(&self, outcome: &RenderOutcome) {
+        self.sinks.iter().for_each(|sink| sink.put(outcome));
+    }
+
     /// Never stops, and reports to nobody.
-    pub const QUIET: Self = Self { stop: &NEVER, progress: &|_| {}, sink: None, samples: None };
+    pub const QUIET: Self = Self { stop: &NEVER, progress: &|_| {}, sinks: &[], samples: None };
 }

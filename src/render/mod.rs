@@ -28,7 +28,7 @@ mod wave;
 
 use serde::{Deserialize, Serialize};
 
-pub use self::control::{CheckpointSink, Control, SampleSink, WaveSamples};
+pub use self::control::{Control, FilmSink, SampleSink, WaveSamples};
 pub use self::gradient::{SHIFTS, Shift};
 pub use self::sampler::Sampler;
 pub use self::schedule::{

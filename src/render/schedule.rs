@@ -114,9 +114,7 @@ pub fn resume(scene: &Scene, settings: RenderSettings, control: &Control, mut ou
         let control = Control { progress: &progress, ..*control };
         run_round(scene, settings, &control, &mut outcome, &|_, _| done + round);
     }
-    if let Some(sink) = control.sink {
-        sink.save(&outcome);
-    }
+    control.conclude(&outcome);
     outcome
 }
 
@@ -129,9 +127,7 @@ pub fn resume_to_counts(
     goals: &[u32],
 ) -> RenderOutcome {
     render_to_counts(scene, settings, control, &mut outcome, goals);
-    if let Some(sink) = control.sink {
-        sink.save(&outcome);
-    }
+    control.conclude(&outcome);
     outcome
 }
 
@@ -241,7 +237,7 @@ impl SampleSink for Both<'_> {
     }
 }
 
-/// Renders up to some goals, with pauses for checkpoints.
+/// Renders up to some goals, with pauses for those who want the film.
 fn run_to(scene: &Scene, settings: RenderSettings, control: &Control, outcome: &mut RenderOutcome, goals: Goals) {
     let (before, start) = (outcome.elapsed, Instant::now());
     let mut paused = true;
@@ -250,13 +246,13 @@ fn run_to(scene: &Scene, settings: RenderSettings, control: &Control, outcome: &
         outcome.elapsed = before + start.elapsed();
         outcome.spp = outcome.film.fewest_samples();
         outcome.stopped = control.stop.load(Ordering::Relaxed);
-        if let (true, Some(sink)) = (paused, control.sink) {
-            sink.save(outcome);
+        if paused {
+            control.sinks.iter().filter(|sink| sink.due()).for_each(|sink| sink.put(outcome));
         }
     }
 }
 
-/// Renders tiles up to their goals, until a checkpoint is due, which returns true. `control.progress` is called with the
+/// Renders tiles up to their goals, until somebody wants the film, which returns true. `control.progress` is called with the
 /// share of finished tiles.
 fn run_tiles(
     scene: &Scene,
@@ -287,8 +283,8 @@ fn run_tiles(
         let mut done = done.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
         *done += 1;
         (control.progress)(*done as f32 / total as f32);
-        // A tile that was at its goal already is no reason for another checkpoint.
-        if worked && control.sink.is_some_and(|sink| sink.due()) {
+        // A tile that was at its goal already is no reason for another pause.
+        if worked && control.sinks.iter().any(|sink| sink.due()) {
             due.store(true, Ordering::Relaxed);
         }
     });

@@ -2,12 +2,13 @@
 
 use std::fmt::Write;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::stress::{Check, Checks};
 
 /// A case that was tried.
-#[derive(Serialize)]
+#[derive(JsonSchema, Serialize)]
 pub struct Row {
     /// Kind and name.
     pub name: &'static str,

@@ -10,6 +10,7 @@ use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, OnceLock};
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use self::column::{COLUMNS, Column};
@@ -45,26 +46,38 @@ struct Array {
 }
 
 /// The description that `samples.json` holds.
-#[derive(Serialize)]
-struct Description {
+#[derive(JsonSchema, Serialize)]
+pub struct Description {
+    /// Version of Fluxion.
     version: String,
+    /// Name of the scene file.
     scene: String,
+    /// The scene's, in hexadecimal.
     fingerprint: String,
+    /// Seed of the samples, as a decimal number.
     seed: String,
+    /// Samples of every pixel that there is room for.
     samples: u32,
     /// Samples that every pixel has, fewer if the render was stopped; zeros stand for the others.
     taken: u32,
+    /// Pixels in a row.
     width: usize,
+    /// Number of rows.
     height: usize,
     /// Neighbours of the differences.
     kernel: String,
+    /// Files in the folder.
     arrays: Vec<Entry>,
 }
 
-#[derive(Serialize)]
-struct Entry {
+/// A file of the folder.
+#[derive(JsonSchema, Serialize)]
+pub struct Entry {
+    /// Name of the file.
     file: String,
+    /// Lengths of the array's indices, the last one fastest.
     shape: Vec<usize>,
+    /// Description of the values.
     content: String,
 }
 

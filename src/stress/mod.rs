@@ -12,6 +12,7 @@ mod systems;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::error::Result;
@@ -26,7 +27,7 @@ pub struct Case {
 }
 
 /// A measured figure and its bound.
-#[derive(Clone, Debug, Serialize)]
+#[derive(JsonSchema, Clone, Debug, Serialize)]
 pub struct Check {
     /// Subject of the figure: a method, a solver, a shift.
     pub subject: String,
@@ -46,7 +47,7 @@ impl Check {
 }
 
 /// Figures of a case.
-#[derive(Debug, Default, Serialize)]
+#[derive(JsonSchema, Debug, Default, Serialize)]
 pub struct Checks {
     /// In the order in which they were made.
     pub list: Vec<Check>,

@@ -14,7 +14,7 @@ use fluxion::film::{EdgeNeed, Film, Layer, Needs};
 use fluxion::image::Image;
 use fluxion::reconstruct::{self, Context};
 use fluxion::render::Shift;
-use fluxion::render::{self, Budget, CheckpointSink, Control, RenderOutcome, RenderSettings, render, resume};
+use fluxion::render::{self, Budget, Control, FilmSink, RenderOutcome, RenderSettings, render, resume};
 use fluxion::scene::Scene;
 
 fn settings(spp: u32, needs: Needs) -> RenderSettings {
@@ -48,12 +48,12 @@ struct Interruption<'a> {
     keep: &'a (dyn Fn(&RenderOutcome) + Sync),
 }
 
-impl CheckpointSink for Interruption<'_> {
+impl FilmSink for Interruption<'_> {
     fn due(&self) -> bool {
         self.tiles.fetch_add(1, Ordering::Relaxed) % 3 == 2
     }
 
-    fn save(&self, outcome: &RenderOutcome) {
+    fn put(&self, outcome: &RenderOutcome) {
         (self.keep)(outcome);
         if self.left.fetch_sub(1, Ordering::Relaxed) == 1 {
             self.stop.store(true, Ordering::Relaxed);
@@ -71,7 +71,7 @@ fn interrupted<T>(
     for times in 2.. {
         let stop = AtomicBool::new(false);
         let interruption = Interruption { tiles: AtomicU32::new(0), left: AtomicU32::new(times), stop: &stop, keep };
-        let control = Control { stop: &stop, sink: Some(&interruption), ..Control::QUIET };
+        let control = Control { stop: &stop, sinks: &[&interruption], ..Control::QUIET };
         let (made, stopped) = work(kept.take(), &control);
         if !stopped {
             return made;

@@ -146,7 +146,7 @@ done; done; echo 7"#,
 }
 
 #[test]
-fn adaptive_jobs_deal_the_samples_of_a_second_round() {
+fn adaptive_jobs_allocate_the_samples_of_a_second_round() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let cornell = scene("cornell-box");
@@ -154,12 +154,12 @@ fn adaptive_jobs_deal_the_samples_of_a_second_round() {
     let plan = ["job", "plan", &cornell, "--spp", "96", "--chunks", "5", "--adaptive", "variance", "-o"];
     expect(at, &[&plan[..], &["j", "--"], &options[..]].concat(), 0, "5 chunks");
     expect(at, &["job", "status", "j", "--missing"], 0, "0\n");
-    expect(at, &["job", "status", "j"], 0, "waiting for `fluxion job deal`: 1-4");
-    expect(at, &["job", "run", "j", "1"], 2, "not dealt yet");
-    expect(at, &["job", "deal", "j"], 2, "chunks 0 of cornell-box are not complete");
+    expect(at, &["job", "status", "j"], 0, "waiting for `fluxion job allocate`: 1-4");
+    expect(at, &["job", "run", "j", "1"], 2, "not allocated yet");
+    expect(at, &["job", "allocate", "j"], 2, "chunks 0 of cornell-box are not complete");
     expect(at, &["job", "run", "j", "0"], 0, "");
-    expect(at, &["job", "deal", "j"], 0, "samples a pixel");
-    expect(at, &["job", "deal", "j"], 0, "is dealt");
+    expect(at, &["job", "allocate", "j"], 0, "samples a pixel");
+    expect(at, &["job", "allocate", "j"], 0, "is allocated");
     expect(at, &["job", "status", "j", "--missing"], 0, "1-4\n");
     for chunk in ["4", "1", "3", "2"] {
         expect(at, &["job", "run", "j", chunk], 0, "");
@@ -197,7 +197,8 @@ fn adaptive_jobs_deal_the_samples_of_a_second_round() {
     };
     submit("array 7, merge 7");
     let log = fs::read_to_string(at.join("log")).unwrap();
-    for part in ["--array=0 ", "--array=1-4 ", "--dependency=afterok:7", "fluxion-deal", "--dependency=afterany:7"] {
+    for part in ["--array=0 ", "--array=1-4 ", "--dependency=afterok:7", "fluxion-allocate", "--dependency=afterany:7"]
+    {
         assert!(log.contains(part), "{part}: {log}");
     }
     assert!(film("k/cornell-box.ckpt") == film("j/cornell-box.ckpt"));
@@ -205,7 +206,7 @@ fn adaptive_jobs_deal_the_samples_of_a_second_round() {
     let template: serde_json::Value = serde_json::from_slice(&fs::read(at.join("k/openjd.yaml")).unwrap()).unwrap();
     let steps = template["steps"].as_array().unwrap();
     let names: Vec<_> = steps.iter().map(|step| step["name"].as_str().unwrap()).collect();
-    assert_eq!(names, ["Render", "Deal", "RenderSecond", "Merge"]);
+    assert_eq!(names, ["Render", "Allocate", "RenderSecond", "Merge"]);
     assert_eq!(steps[3]["dependencies"][0]["dependsOn"], "RenderSecond");
 }
 
@@ -284,7 +285,7 @@ fn plans_that_cannot_be_carried_out_are_refused() {
         (&["--spp", "16", "--", "--method", "l2", "--kernel", "structure"], "pilots of their own"),
         (&["--spp", "16", "--chunks", "0"], "--chunks"),
         (&["--spp", "64", "--adaptive"], "two rounds take --chunks 2"),
-        (&["--spp", "64", "--chunks", "4", "--adaptive", "--", "--method", "primal"], "does not estimate its error"),
+        (&["--spp", "64", "--chunks", "4", "--adaptive", "--", "--method", "l1"], "does not estimate its error"),
     ] {
         expect(at, &[&["job", "plan", &cornell, "-o", "j"], extra].concat(), 2, expected);
     }

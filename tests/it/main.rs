@@ -26,6 +26,7 @@ mod oidn;
 mod outputs;
 mod report;
 mod samples;
+mod shell;
 mod stress;
 mod textures;
 mod vocabulary;

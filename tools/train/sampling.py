@@ -29,7 +29,7 @@ from steps import STEPS
 # Samples of the pilot, those of every snapshot, and the most that a pixel gets.
 PILOT, SNAPSHOTS = 8, (8, 16, 32, 64, 128)
 MOST = SNAPSHOTS[-1] - PILOT
-# Means of the samples to deal; half of them are dealt evenly, as in src/adaptive/allocate.rs.
+# Means of the samples to allocate; half of them are allocated evenly, as in src/adaptive/allocate.rs.
 BUDGETS, TEST_BUDGET, EVEN = (16, 24, 32, 40), 40, 0.5
 CHANNELS, WIDTH, DILATIONS = 16, 32, (1, 2, 1)
 # Bound of the logarithm of a need.
@@ -140,7 +140,7 @@ def back(step):
     return -step[0], -step[1]
 
 
-def dealt(need, budget):
+def allocated(need, budget):
     """Samples of every pixel beyond the pilot, `budget` in the mean, so that all of them are as nearly proportional to the needs as
     src/adaptive/allocate.rs makes them."""
     share = lambda level: (level * need - PILOT).clamp(EVEN * budget, MOST)
@@ -187,7 +187,7 @@ def train(options):
     def loss(rng):
         groups, budget = training[rng.integers(len(training))], BUDGETS[rng.integers(len(BUDGETS))]
         need = torch.exp(net(known(groups.inputs, *(bool(there) for there in rng.random(2) >= WITHOUT))))
-        made = groups.solved(dealt(need, budget), rng, ITERATIONS)
+        made = groups.solved(allocated(need, budget), rng, ITERATIONS)
         return error(made, groups.target) / (even_error(groups, budget) + LEAST)
 
     runs.descend(net, loss, RATE, options, longest=1.0, factors=runs.cosine(options.steps))
@@ -210,7 +210,7 @@ def compared(net, apart):
             def errors(need):
                 found = []
                 for seed in range(4):
-                    image = groups.solved(dealt(need, TEST_BUDGET), np.random.default_rng(seed), TEST_ITERATIONS)
+                    image = groups.solved(allocated(need, TEST_BUDGET), np.random.default_rng(seed), TEST_ITERATIONS)
                     scale = kernels.exposure(groups.target)
                     square = ((image - groups.target) ** 2 / (groups.target ** 2 + EPSILON)).mean()
                     found.append([float(smape(image * scale, groups.target * scale)), float(square)])

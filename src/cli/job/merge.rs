@@ -8,7 +8,7 @@ use clap::Parser;
 use fluxion::checkpoint;
 use fluxion::error::Error;
 
-use super::chunk::Job;
+use super::description::Job;
 use super::status::ranges;
 use crate::cli::terminal::{note, out};
 use crate::cli::{Args as CliArgs, Command, reconstruct};

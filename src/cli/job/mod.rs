@@ -4,16 +4,20 @@
 //! ```text
 //! plan --job.json--> run 0, 1, 2, ... (on any machine) --checkpoints--> status, merge --> images
 //!                     ^                                        |
-//!                     +---- goals of a second round ---- deal <+
+//!                     +---- goals of a second round -- allocate <+
 //! ```
 
+mod allocate;
 mod chunk;
-mod deal;
+mod description;
 mod merge;
 mod plan;
 mod run;
 mod schedulers;
 mod status;
+
+pub use self::description::Job;
+pub use self::status::Status;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -40,7 +44,7 @@ enum Command {
         chunk: usize,
     },
     /// Allocate the samples of an adaptive job's second round, when the first is complete
-    Deal {
+    Allocate {
         /// Folder of the job
         job: PathBuf,
     },
@@ -55,7 +59,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     match &args.command {
         Command::Plan(args) => plan::run(args),
         Command::Run { job, chunk } => run::run(job, *chunk),
-        Command::Deal { job } => deal::run(job),
+        Command::Allocate { job } => allocate::run(job),
         Command::Status(args) => status::run(args),
         Command::Merge(args) => merge::run(args),
     }

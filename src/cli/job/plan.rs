@@ -7,7 +7,7 @@ use anyhow::{Context, Result, bail};
 use fluxion::adaptive::ALLOCATORS;
 use fluxion::error::Error;
 
-use super::chunk::{Job, Settings};
+use super::description::{Job, Settings};
 use super::schedulers;
 use crate::cli::render;
 use crate::cli::terminal::out;
@@ -30,7 +30,7 @@ pub struct Args {
     /// Chunks of every image
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     chunks: u32,
-    /// Take a quarter of the samples first, by which an allocator deals the others, in a second round
+    /// Take a quarter of the samples first, by which an allocator allocates the others, in a second round
     #[arg(long, value_name = "ALLOCATOR", num_args = 0..=1, default_missing_value = ALLOCATORS[0].id(), value_parser = render::allocator_names())]
     adaptive: Option<String>,
     /// Seed of the random numbers
@@ -63,7 +63,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let absolute = folder.canonicalize().map_err(|error| Error::io(folder, error))?;
     schedulers::write(folder, &absolute, &job.rounds())?;
     job.save()?;
-    let second = if job.adaptive().is_some() { ", after `fluxion job deal` each of commands-2.txt" } else { "" };
+    let second = if job.adaptive.is_some() { ", after `fluxion job allocate` each of commands-2.txt" } else { "" };
     out!("{}: {} chunks; each line of commands.txt renders one{second}", folder.display(), job.chunks())?;
     Ok(ExitCode::SUCCESS)
 }

@@ -6,7 +6,8 @@ use std::process::ExitCode;
 use anyhow::{Result, bail};
 use fluxion::error::Error;
 
-use super::chunk::{Job, State};
+use super::chunk::State;
+use super::description::Job;
 use crate::cli::terminal::note;
 use crate::cli::{interrupt, render};
 
@@ -23,8 +24,8 @@ pub fn run(folder: &Path, number: usize) -> Result<ExitCode> {
         bail!(Error::mismatch(&whole, "is no checkpoint of this chunk: remove it, and run the chunk again"))
     }
     let Some(chunk) = job.chunk(number)? else {
-        let what = format!("the samples of chunk {number} are not dealt yet: run those of the first round, then");
-        bail!(Error::Usage(format!("{what} `fluxion job deal {}`", folder.display())));
+        let what = format!("the samples of chunk {number} are not allocated yet: run those of the first round, then");
+        bail!(Error::Usage(format!("{what} `fluxion job allocate {}`", folder.display())));
     };
     let code = render::run(&*job.render(&chunk, &part)?)?;
     if interrupt::stopped().is_none() {

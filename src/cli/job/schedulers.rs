@@ -24,7 +24,7 @@ pub fn write(folder: &Path, job: &Path, rounds: &[Range<usize>; 2]) -> Result<()
 }
 
 /// Submits an array of all chunks that are not complete, and a merge when it has ended. A chunk that was stopped is queued again. Of two
-/// rounds the second waits until its samples have been dealt.
+/// rounds the second waits until its samples have been allocated.
 fn slurm(job: &str, rounds: &[Range<usize>; 2]) -> String {
     let chunks = rounds[1].end;
     let second = if rounds[1].is_empty() { String::new() } else { second_round(&rounds[1]) };
@@ -59,7 +59,7 @@ step() {{
 	FLUXION_STEP="$name" sbatch --parsable --job-name="fluxion-$name" --open-mode=append --output="$job/slurm-$name.log" "$@" <<'EOF'
 #!/bin/sh
 case $FLUXION_STEP in
-deal) exec srun fluxion job deal {job} ;;
+allocate) exec srun fluxion job allocate {job} ;;
 merge) exec srun fluxion job merge --partial {job} ;;
 esac
 EOF
@@ -77,18 +77,18 @@ echo "array $array, merge $merge"
     )
 }
 
-/// The part of the script that renders a first round and deals the second, unless that has been done.
+/// The part of the script that renders a first round and allocates the second, unless that has been done.
 fn second_round(round: &Range<usize>) -> String {
     format!(
-        r#"if [ ! -e "$job/dealt.json" ]; then
+        r#"if [ ! -e "$job/allocated.json" ]; then
 	if [ -n "$missing" ]; then
 		first=$(chunks "$missing" "$@")
-		deal=$(step deal --dependency=afterany:"${{first%%;*}}")
+		allocation=$(step allocate --dependency=afterany:"${{first%%;*}}")
 	else
-		deal=$(step deal)
+		allocation=$(step allocate)
 	fi
 	missing={}
-	set -- "$@" --dependency=afterok:"${{deal%%;*}}" --kill-on-invalid-dep=yes
+	set -- "$@" --dependency=afterok:"${{allocation%%;*}}" --kill-on-invalid-dep=yes
 fi
 "#,
         range(round)
@@ -100,7 +100,7 @@ fn range(numbers: &Range<usize>) -> String {
     ranges(&numbers.clone().collect::<Vec<_>>())
 }
 
-/// A template with a task for every chunk, and a step that merges them; of two rounds with one that deals the second.
+/// A template with a task for every chunk, and a step that merges them; of two rounds with one that allocates the second.
 fn openjd(job: &Path, rounds: &[Range<usize>; 2]) -> Result<String> {
     let script = |words: &[&str], chunk: Option<&str>| {
         let job = job.display().to_string();
@@ -115,7 +115,7 @@ fn openjd(job: &Path, rounds: &[Range<usize>; 2]) -> Result<String> {
     };
     let mut steps = vec![render("Render", &rounds[0])];
     if !rounds[1].is_empty() {
-        steps.push(json!({"name": "Deal", "script": script(&["job", "deal"], None)}));
+        steps.push(json!({"name": "Allocate", "script": script(&["job", "allocate"], None)}));
         steps.push(render("RenderSecond", &rounds[1]));
     }
     steps.push(json!({"name": "Merge", "script": script(&["job", "merge"], None)}));

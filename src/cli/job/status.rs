@@ -4,9 +4,11 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::Result;
+use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::chunk::{Job, State};
+use super::chunk::State;
+use super::description::Job;
 use crate::cli::terminal::out;
 
 /// Options of `job status`.
@@ -26,8 +28,8 @@ pub struct Args {
 }
 
 /// Numbers of chunks by their states.
-#[derive(Default, Serialize)]
-struct Status {
+#[derive(JsonSchema, Default, Serialize)]
+pub struct Status {
     chunks: usize,
     complete: usize,
     started: Vec<usize>,
@@ -64,7 +66,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     for (what, numbers) in [
         ("started", started),
         ("missing", missing),
-        ("waiting for `fluxion job deal`", waiting),
+        ("waiting for `fluxion job allocate`", waiting),
         ("damaged or foreign", wrong),
     ] {
         if !numbers.is_empty() {

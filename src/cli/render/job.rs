@@ -3,13 +3,13 @@
 use std::time::Instant;
 
 use anyhow::Result;
-use fluxion::adaptive::{self, ALLOCATORS, AdaptiveOutcome, AdaptiveSettings, Limits, Start};
+use fluxion::adaptive::{self, AdaptiveOutcome, AdaptiveSettings, Allocator, Limits, Start};
 use fluxion::film::{Frame, Needs, Provenance, exr};
 use fluxion::image::io::{DataWindow, failed_lookups};
 use fluxion::neighbours::Selector;
 use fluxion::reconstruct::{Reconstruction, Solution};
 use fluxion::reference::fingerprint;
-use fluxion::render::{self, Budget, Control, RenderOutcome, RenderSettings, SampleId, SampleSink};
+use fluxion::render::{self, Budget, Control, FilmSink, RenderOutcome, RenderSettings, SampleId, SampleSink};
 use fluxion::samples::SampleWriter;
 use fluxion::scene::Scene;
 
@@ -18,6 +18,7 @@ use crate::cli::checkpoint::CheckpointWriter;
 use crate::cli::interrupt::stop_on_signal;
 use crate::cli::stats::Stats;
 use crate::cli::terminal::note;
+use crate::cli::viewer::Viewer;
 use crate::cli::{method, progress};
 
 /// A render with its options.
@@ -25,9 +26,11 @@ pub struct Job<'a> {
     pub args: &'a Args,
     pub scene: &'a Scene,
     pub method: &'a dyn Reconstruction,
+    pub allocator: Option<&'a dyn Allocator>,
     pub kernel: Selector,
     pub goals: Option<Vec<u32>>,
     pub sink: Option<&'a CheckpointWriter<'a>>,
+    pub viewer: Option<&'a Viewer>,
 }
 
 /// Everything that is to be written.
@@ -43,11 +46,14 @@ impl Job<'_> {
     /// Renders, reconstructs and writes.
     pub fn run(&self, start: Start, stats: &mut Stats) -> Result<()> {
         let args = self.args;
-        let Rendered { frame, solution, layers } = match self.allocator() {
+        let Rendered { frame, solution, layers } = match self.allocator {
             Some(allocator) => self.adaptive(allocator, start, stats)?,
             None => self.straight(start, stats)?,
         };
         if let Some(solution) = solution {
+            if let Some(viewer) = self.viewer {
+                viewer.show(&solution.image);
+            }
             method::write(&args.method, &args.output, &solution, &frame, stats)?;
         }
         layers?;
@@ -55,13 +61,6 @@ impl Job<'_> {
             stats.save(path)?;
         }
         Ok(())
-    }
-
-    /// The allocator that is asked for, or the default one where there is time or an error to decide by.
-    fn allocator(&self) -> Option<&str> {
-        let Args { adaptive, time, target_error, .. } = self.args;
-        let by_default = (time.is_some() && self.method.estimates_error()) || target_error.is_some();
-        adaptive.as_deref().or_else(|| by_default.then(|| ALLOCATORS[0].id()))
     }
 
     fn settings(&self, needs: Needs, budget: Budget) -> RenderSettings {
@@ -75,8 +74,9 @@ impl Job<'_> {
         let bar = progress::bar(self.args.quiet);
         bar.set_message("rendering");
         let report = |share| bar.set(share);
-        let sink = self.sink.map(|sink| sink as &dyn render::CheckpointSink);
-        let done = work(&Control { stop, progress: &report, sink, samples: None });
+        let checkpoints = self.sink.map(|sink| sink as &dyn FilmSink);
+        let sinks: Vec<_> = checkpoints.into_iter().chain(self.viewer.map(|viewer| viewer as &dyn FilmSink)).collect();
+        let done = work(&Control { stop, progress: &report, sinks: &sinks, samples: None });
         bar.finish();
         done
     }
@@ -111,7 +111,7 @@ impl Job<'_> {
     }
 
     /// In passes that allocate samples to the pixels that need them.
-    fn adaptive(&self, allocator: &str, start: Start, stats: &mut Stats) -> Result<Rendered> {
+    fn adaptive(&self, allocator: &dyn Allocator, start: Start, stats: &mut Stats) -> Result<Rendered> {
         let args = self.args;
         let limits = Limits {
             // Without any limit the scene says how much.
@@ -122,7 +122,7 @@ impl Job<'_> {
         let settings = AdaptiveSettings {
             render: self.settings(start.render.film.needs, Budget::Spp(1)),
             method: self.method,
-            allocator: adaptive::allocator(allocator)?,
+            allocator,
             limits,
             reconstruction: None,
         };

@@ -15,7 +15,7 @@ use fluxion::error::Error;
 use fluxion::film::Needs;
 use fluxion::neighbours::Selector;
 use fluxion::plan::Plan;
-use fluxion::reconstruct;
+use fluxion::reconstruct::{self, Reconstruction};
 use fluxion::reference::fingerprint;
 use fluxion::render::{self, RenderOutcome, SHIFTS, SampleId, Shift};
 use fluxion::scene::{Scene, load};
@@ -23,6 +23,7 @@ use fluxion::scene::{Scene, load};
 use self::job::Job;
 use super::outputs::Claims;
 use super::stats::Stats;
+use super::viewer::{self, Viewer};
 use super::{checkpoint, kernel, method, progress, stats};
 use crate::cli::interrupt::stop_on_signal;
 use crate::cli::terminal::{note, out};
@@ -99,6 +100,9 @@ pub struct Args {
     /// Trace one sample again and print it: column, row and number of the sample
     #[arg(long, value_parser = parse_sample, value_name = "X,Y,S")]
     replay: Option<(usize, usize, u32)>,
+    /// Show the image in the viewer tev while it is rendered [tev:127.0.0.1:14158]
+    #[arg(long, value_name = "tev[:HOST[:PORT]]")]
+    display: Option<viewer::Address>,
     /// How paths are shifted to neighbouring pixels
     #[arg(long, default_value = SHIFTS[0].id, value_parser = shift_names(), hide_short_help = true)]
     shift: String,
@@ -195,7 +199,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         Shifted::Always => method.needs().with_every_difference(),
         Shifted::Auto => method.needs(),
     };
-    let needed = needed.union(kernel.needs());
+    let allocator = allocator(args, method.as_ref())?;
+    let needed = needed.union(kernel.needs()).union(allocator.map_or(Needs::default(), Allocator::needs));
     let saved = saved(args, needed);
     let plan = match args.plan {
         Planned::Needed => Plan::new(&scene, needed, saved),
@@ -220,14 +225,24 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         None => Start { render: RenderOutcome::new(&scene, plan.needs), journal: &journal },
     };
     let sink = origin.zip(lock).and_then(|(origin, lock)| args.checkpoint.sink(origin, &start, lock));
-    let done =
-        Job { args, scene: &scene, method: method.as_ref(), kernel, goals, sink: sink.as_ref() }.run(start, &mut stats);
-    match &sink {
+    let name = args.output.first().unwrap_or(&args.scene).display().to_string();
+    let size = (scene.sensor().width, scene.sensor().height);
+    let viewer = args.display.as_ref().map(|address| Viewer::new(address, &name, size)).transpose()?;
+    let (scene, method, sink, viewer) = (&scene, method.as_ref(), sink.as_ref(), viewer.as_ref());
+    let done = Job { args, scene, method, allocator, kernel, goals, sink, viewer }.run(start, &mut stats);
+    match sink {
         Some(sink) => sink.conclude(done)?,
         None => done?,
     }
     report(args, &stats);
     Ok(ExitCode::SUCCESS)
+}
+
+/// The allocator that is asked for, or the default one where there is time or an error to decide by.
+fn allocator(args: &Args, method: &dyn Reconstruction) -> Result<Option<&'static dyn Allocator>> {
+    let by_default = (args.time.is_some() && method.estimates_error()) || args.target_error.is_some();
+    let name = args.adaptive.as_deref().or_else(|| by_default.then(|| ALLOCATORS[0].id()));
+    Ok(name.map(adaptive::allocator).transpose()?)
 }
 
 /// Sample counts that the film's pixels are to have, if a file says.

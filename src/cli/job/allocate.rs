@@ -1,4 +1,4 @@
-//! `fluxion job deal`.
+//! `fluxion job allocate`.
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -9,18 +9,18 @@ use fluxion::checkpoint;
 use fluxion::error::Error;
 use fluxion::reconstruct::{self, Context};
 
-use super::chunk::Job;
+use super::description::Job;
 use super::status::ranges;
 use crate::cli::terminal::{note, out};
 
 /// Allocates the samples of the second round by those of the first, and divides them into chunks.
 pub fn run(folder: &Path) -> Result<ExitCode> {
     let job = Job::load(folder)?;
-    let Some(first) = job.adaptive() else {
-        bail!(Error::Usage("this job has one round, with nothing to deal: plan two by --adaptive".into()));
+    let Some(first) = &job.adaptive else {
+        bail!(Error::Usage("this job has one round, with nothing to allocate: plan two by --adaptive".into()));
     };
-    if job.is_dealt() {
-        note!("the second round is dealt");
+    if job.allocated.is_some() {
+        note!("the second round is allocated");
         return Ok(ExitCode::SUCCESS);
     }
     let mut bounds = Vec::new();
@@ -38,6 +38,6 @@ pub fn run(folder: &Path) -> Result<ExitCode> {
         let (least, most) = (goals.counts.iter().min().unwrap_or(&0), goals.counts.iter().max().unwrap_or(&0));
         out!("{}: {least} to {most} samples a pixel", job.name(image))?;
     }
-    job.deal(&bounds)?;
+    job.allocate(&bounds)?;
     Ok(ExitCode::SUCCESS)
 }
