@@ -29,6 +29,7 @@
 pub mod error;
 pub mod files;
 pub mod math;
+pub mod mattes;
 
 pub mod ffi;
 pub mod image;

@@ -1,6 +1,6 @@
 """Reconstructions on the cross and on other kernels at equal samples, as the tables of docs/kernels.md.
 
-    python tools/kernels.py SCENES REFERENCES [--depth N [--reference 8192] [--keep DIR]] [--spp 16,64] [--seeds 3] [--kernels cross,structure] [--shift reconnect]
+    python tools/kernels.py SCENES REFERENCES [--depth N [--reference 8192] [--keep DIR]] [--spp 16,64] [--seeds 3] [--kernels cross,structure] [--shift reconnect] [--method l1]
 
 SCENES is a folder with NAME/scene.xml; REFERENCES one with NAME.exr and NAME_var.exr. With a depth other than the scenes' own the
 references are rendered here, by path tracing with --reference samples of another seed. Errors are means over seeds and geometric means over
@@ -26,7 +26,14 @@ WEIGHTS = ("uniform", "variance")
 OWN_WEIGHTS = ("given", "product")
 
 
-def weights_of(kernel):
+# The method whose weights are compared.
+CONTROL = "control_variate"
+
+
+def weights_of(kernel, method=CONTROL):
+    """Weights to compare; other methods have their own."""
+    if method != CONTROL:
+        return WEIGHTS[:1]
     return WEIGHTS + (OWN_WEIGHTS if kernel.startswith("learned") else ())
 
 
@@ -55,10 +62,11 @@ def errors(args, folder, name, path, size, kernel, spp, seed):
     layers, image, stats = (os.path.join(folder, file) for file in ("l.exr", "i.exr", "s.json"))
     depth = ["--max-depth", args.depth] if args.depth else []
     run("render", scene(args, name), "-o", image, "-q", "--size", size, "--spp", spp, "--seed", seed, "--layers", layers,
-        "--method", "control_variate", "--kernel", kernel, "--shift", args.shift, "--json", stats, *depth)
+        "--method", args.method, "--kernel", kernel, "--shift", args.shift, "--json", stats, *depth)
     found = {}
-    for weights in weights_of(kernel):
-        run("reconstruct", layers, "-o", image, "-q", "--method", "control_variate:weights=" + weights)
+    for weights in weights_of(kernel, args.method):
+        method = "control_variate:weights=" + weights if args.method == CONTROL else args.method
+        run("reconstruct", layers, "-o", image, "-q", "--method", method)
         found[weights] = json.loads(run("compare", image, path, "--json"))
     with open(stats) as file:
         return found, json.load(file)["seconds"]["render"]
@@ -75,32 +83,34 @@ def main():
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--kernels", default="cross,structure")
     parser.add_argument("--shift", default="reconnect")
+    parser.add_argument("--method", default=CONTROL, help="another method on edges")
     args = parser.parse_args()
     # Parameters of a kernel are given with + in place of a comma.
     kernels = [kernel.replace("+", ",") for kernel in args.kernels.split(",")]
-    print("| spp | weights | kernel | SMAPE | FLIP | relMSE | SMAPE / first | worst | relMSE / first | worst | time / first |")
-    print("|---|---|---|---|---|---|---|---|---|---|---|")
+    print("| spp | weights | kernel | SMAPE | FLIP | 1 - MS-SSIM | relMSE | SMAPE / first | worst | relMSE / first | worst | time / first |")
+    print("|---|---|---|---|---|---|---|---|---|---|---|---|")
     with tempfile.TemporaryDirectory() as folder:
         references = {name: reference(args, name, folder) for name in NAMES}
         for spp in args.spp.split(","):
-            of = {(weights, kernel): [] for kernel in kernels for weights in weights_of(kernel)}
+            of = {(weights, kernel): [] for kernel in kernels for weights in weights_of(kernel, args.method)}
             for name in NAMES:
                 runs = {key: [] for key in of}
                 for seed in range(1, args.seeds + 1):
                     for kernel in kernels:
                         found, seconds = errors(args, folder, name, *references[name], kernel, spp, seed)
-                        for weights in weights_of(kernel):
+                        for weights in found:
                             metrics = found[weights]
-                            runs[weights, kernel].append((metrics["smape"], metrics["flip"], metrics["relmse"], seconds))
+                            values = metrics["smape"], metrics["flip"], 1 - metrics.get("ms_ssim", 0), metrics["relmse"], seconds
+                            runs[weights, kernel].append(values)
                 for key, values in runs.items():
                     of[key].append([statistics.mean(column) for column in zip(*values)])
             for (weights, kernel), rows in of.items():
-                mean = [math.exp(statistics.mean(math.log(row[k]) for row in rows)) for k in range(4)]
+                mean = [math.exp(statistics.mean(math.log(row[k]) for row in rows)) for k in range(5)]
                 first = of[weights if weights in WEIGHTS else WEIGHTS[-1], kernels[0]]
-                ratios = [[a[k] / b[k] for a, b in zip(rows, first)] for k in range(4)]
+                ratios = [[a[k] / b[k] for a, b in zip(rows, first)] for k in range(5)]
                 product = [math.exp(statistics.mean(map(math.log, column))) for column in ratios]
-                print("| %s | %s | %s | %.3f | %.3f | %.4f | %.2f | %.2f | %.2f | %.2f | %.2f |" % (
-                    spp, weights, kernel, *mean[:3], product[0], max(ratios[0]), product[2], max(ratios[2]), product[3]), flush=True)
+                print("| %s | %s | %s | %.3f | %.3f | %.4f | %.4f | %.2f | %.2f | %.2f | %.2f | %.2f |" % (
+                    spp, weights, kernel, *mean[:4], product[0], max(ratios[0]), product[3], max(ratios[3]), product[4]), flush=True)
 
 
 if __name__ == "__main__":

@@ -2,7 +2,7 @@
 //! what both encoders had at its size. At full size it may see the inputs, too, which the published one does not.
 
 use super::convolution::{Activation, Convolution};
-use super::tensor::{Tensor, in_bands};
+use super::tensor::{Tensor, band_rows, in_bands};
 use super::weights::Weights;
 
 /// Slope of leaky ReLU.
@@ -11,9 +11,6 @@ const SLOPE: f32 = 0.01;
 /// How often the encoders halve the image, and number of residual blocks.
 const LEVELS: usize = 3;
 const BLOCKS: usize = 4;
-
-/// Rows that are worked on at a time: what bounds the memory.
-const ROWS: usize = 128;
 
 /// Rows that an output depends on, to either side: two for every residual block and less than four for all the rest, in pixels
 /// of the deepest level.
@@ -94,7 +91,11 @@ impl GradNet {
     /// The output for `both`, the channels of the data encoder's input and after them those of the gradient encoder's. Bands of
     /// rows bound the memory and do not change the values.
     pub fn apply(&self, both: &Tensor) -> Tensor {
-        in_bands(both, (ROWS, Self::MULTIPLE, REACH), |both| self.whole(both))
+        self.in_bands(both, band_rows((both.width, both.height), REACH))
+    }
+
+    fn in_bands(&self, both: &Tensor, rows: usize) -> Tensor {
+        in_bands(both, (rows, Self::MULTIPLE, REACH), |both| self.whole(both))
     }
 
     fn whole(&self, both: &Tensor) -> Tensor {
@@ -148,10 +149,10 @@ mod tests {
     fn bands_change_nothing() {
         let vectors = Weights::parse(PRINTED).unwrap();
         let (network, part) = (GradNet::new(&vectors).unwrap(), inputs(&vectors));
-        let rows = (2 * ROWS + 3 * REACH).next_multiple_of(GradNet::MULTIPLE);
+        let rows = 5 * REACH;
         let tall = Tensor::from_fn(part.width, rows, part.channels, |x, y, pixel| {
             pixel.copy_from_slice(part.pixel(x, y * y % part.height));
         });
-        assert_eq!(network.apply(&tall), network.whole(&tall));
+        assert_eq!(network.in_bands(&tall, REACH), network.whole(&tall));
     }
 }

@@ -85,6 +85,22 @@ impl Tensor {
     }
 }
 
+/// Pixels of a band, and of larger images the share of their rows that a band may have.
+const PIXELS: usize = 1 << 20;
+const SHARE: f64 = 0.6;
+
+/// Rows of bands for a network whose outputs depend on inputs up to `reach` rows away: as few bands as memory has room for, as what
+/// they have in common is computed twice.
+pub fn band_rows((width, height): (usize, usize), reach: usize) -> usize {
+    let most = (PIXELS / width.max(1)).max((SHARE * height as f64) as usize);
+    if height <= most {
+        return height;
+    }
+    let beside = |bands: usize| if bands == 2 { reach } else { 2 * reach };
+    let bands = (2..=height).find(|&bands| height.div_ceil(bands) + beside(bands) <= most);
+    height.div_ceil(bands.unwrap_or(2))
+}
+
 /// The network `apply` on bands of about `rows` rows, so that its own memory is bounded. The values are those of all rows at
 /// once, if no output depends on inputs more than `reach` rows away and the network halves sizes by `multiple` at most.
 pub fn in_bands(
@@ -106,4 +122,20 @@ pub fn in_bands(
         channels = band.channels;
     }
     Tensor { channels, data, ..*input }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bands_are_few_and_no_larger_than_memory_has_room_for() {
+        assert_eq!(band_rows((1280, 720), 96), 720);
+        assert_eq!(band_rows((1920, 1080), 96), 540);
+        assert_eq!(band_rows((3840, 2160), 96), 1080);
+        for (width, height) in [(1, 1), (40_000, 30), (30, 40_000), (7680, 4320)] {
+            let rows = band_rows((width, height), 96);
+            assert!((1..=height).contains(&rows), "{rows} of {width}x{height}");
+        }
+    }
 }

@@ -3,7 +3,7 @@
 
 use super::convolution::{Activation, Convolution};
 use super::resample::{max_pool, nearest};
-use super::tensor::{Tensor, in_bands};
+use super::tensor::{Tensor, band_rows, in_bands};
 use super::weights::Weights;
 
 /// Slope of leaky ReLU.
@@ -70,12 +70,13 @@ impl UNet {
         1 << self.up.len()
     }
 
-    /// The output, worked on in bands of `rows` rows, which bounds the memory and does not change the values.
-    pub fn apply(&self, input: &Tensor, rows: usize) -> Tensor {
+    /// The output, worked on in bands of rows, which bounds the memory and does not change the values.
+    pub fn apply(&self, input: &Tensor) -> Tensor {
         let deepest = self.multiple();
         // A convolution reaches one pixel of its level; all of the finer levels together reach less than three of the deepest
         // one's, and halving and doubling less than one each.
-        in_bands(input, (rows, deepest, 6 * deepest), |input| self.whole(input))
+        let (rows, reach) = (band_rows((input.width, input.height), 6 * deepest), 6 * deepest);
+        in_bands(input, (rows, deepest, reach), |input| self.whole(input))
     }
 
     fn whole(&self, input: &Tensor) -> Tensor {

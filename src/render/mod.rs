@@ -21,6 +21,7 @@ mod record;
 mod sampler;
 mod schedule;
 mod seen;
+mod shown;
 mod thinning;
 mod tracer;
 mod vertices;
@@ -34,6 +35,7 @@ pub use self::sampler::Sampler;
 pub use self::schedule::{
     Budget, RenderOutcome, RenderSettings, render, render_to_counts, resume, resume_to_counts, sample,
 };
+pub use self::shown::{ShownShapes, shown_shapes};
 pub use self::wave::Samples;
 
 /// One sample of one pixel, the same whenever and wherever it is asked for.

@@ -68,6 +68,10 @@ impl Default for Integrator {
 
 /// A surface with its material.
 pub struct Shape {
+    /// Its id in the scene file, or its type and line.
+    pub name: Arc<str>,
+    /// The same of the material.
+    pub material: Arc<str>,
     /// The surface.
     pub geometry: Arc<Geometry>,
     /// The material.

@@ -20,6 +20,7 @@ mod kernels;
 mod learned;
 mod lights;
 mod loader;
+mod mattes;
 mod methods;
 mod nn;
 mod oidn;

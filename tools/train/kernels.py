@@ -2,7 +2,7 @@
 
     python tools/train/kernels.py train FRAMES --run runs/kernels
     python tools/train/kernels.py test FRAMES --run runs/kernels
-    python tools/train/kernels.py export FRAMES --run runs/kernels
+    python tools/train/kernels.py export FRAMES --run runs/kernels [--preset full]
 
 FRAMES is a folder of kernel_frames.py; ten of every hundred scenes are kept apart for tests. Samples of the pilot are encoded one by one;
 a U-Net sees their means and largest values (Josse et al. 2025). Scores choose neighbours by degrees that become sharper as training
@@ -28,7 +28,8 @@ from unet import UNet, act
 
 TOP = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..")
 FEATURES, ENCODED, HIDDEN, HEAD = 17, 32, 25, 32
-DOWN, UP = [32, 32, 40, 48], [40, 32, 32]
+# Widths of the U-Net: half of the paper's, and the paper's.
+WIDTHS = {"half": ([32, 32, 40, 48], [40, 32, 32]), "full": ([64, 64, 80, 96], [80, 64, 64])}
 # Periods in pixels of the position's sines and cosines.
 PERIODS = (4, 16)
 COUNT, CHOSEN = len(STEPS), 4
@@ -42,11 +43,11 @@ EPSILON, SIMILARITY, LEAST = 0.01, 0.3, 0.02
 
 
 class Network(nn.Module):
-    def __init__(self):
+    def __init__(self, preset="half"):
         super().__init__()
         dense = lambda i, o: nn.Conv2d(i, o, 1)
         self.encoder = nn.ModuleList([dense(FEATURES, ENCODED), dense(ENCODED, ENCODED), dense(ENCODED, ENCODED)])
-        self.unet = UNet(2 * ENCODED + 4 * len(PERIODS), HIDDEN, DOWN, UP)
+        self.unet = UNet(2 * ENCODED + 4 * len(PERIODS), HIDDEN, *WIDTHS[preset])
         self.head = nn.ModuleList([dense(HIDDEN, HEAD), dense(HEAD, 2 * COUNT + 1)])
         with torch.no_grad():
             self.head[1].weight.mul_(0.1)
@@ -222,7 +223,7 @@ def train(options):
     training, apart = load(options.frames)
     print(f"{len(training)} frames to train on, {len(apart)} apart", flush=True)
     torch.manual_seed(options.seed)
-    net, choose = Network(), selection.Selection(COUNT, CHOSEN)
+    net, choose = Network(options.preset), selection.Selection(COUNT, CHOSEN)
     optimiser = torch.optim.Adam(net.parameters(), RATE)
     schedule = torch.optim.lr_scheduler.LambdaLR(optimiser, runs.cosine(options.steps, 200))
     soft = SOFT * options.steps
@@ -281,16 +282,16 @@ def compared(net, apart):
 
 
 def test(options):
-    compared(runs.trained(Network(), options)[0], load(options.frames)[1])
+    compared(runs.trained(Network(options.preset), options)[0], load(options.frames)[1])
 
 
 def export(options):
     """Writes half floats, and for the tests what the network makes of one crop."""
-    (net, steps), apart = runs.trained(Network(), options), load(options.frames)[1]
+    (net, steps), apart = runs.trained(Network(options.preset), options), load(options.frames)[1]
     if not compared(net, apart):
         raise SystemExit("not exported: the cross is better")
     net = net.half().float()
-    recipe = {"steps": steps, "rate": RATE, "seed": options.seed, "encoded samples": apart[0].samples.shape[0]}
+    recipe = {"preset": options.preset, "steps": steps, "rate": RATE, "seed": options.seed, "encoded samples": apart[0].samples.shape[0]}
     save_file({name: value.half().contiguous() for name, value in net.state_dict().items()},
               os.path.join(TOP, "src/neighbours/learned/learned.safetensors"), {"recipe": json.dumps(recipe)})
     samples = apart[0].samples[:, :, :16, :24].float()
@@ -302,4 +303,5 @@ def export(options):
 
 
 if __name__ == "__main__":
-    runs.command(__doc__, STEPS_OF_TRAINING, train=train, test=test, export=export)
+    preset = lambda parser: parser.add_argument("--preset", choices=list(WIDTHS), default="half")
+    runs.command(__doc__, STEPS_OF_TRAINING, preset, train=train, test=test, export=export)

@@ -25,11 +25,12 @@ def arguments(parser, steps):
     parser.add_argument("--threads", type=int, default=2)
 
 
-def command(description, steps, **actions):
-    """Runs the action that the command line names, with the options of a run."""
+def command(description, steps, add_options=lambda parser: None, **actions):
+    """Runs the action that the command line names, with the options of a run and those that are added."""
     parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("action", choices=list(actions))
     arguments(parser, steps)
+    add_options(parser)
     options = parser.parse_args()
     actions[options.action](options)
 

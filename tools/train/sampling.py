@@ -35,7 +35,7 @@ CHANNELS, WIDTH, DILATIONS = 16, 32, (1, 2, 1)
 # Bound of the logarithm of a need.
 LONGEST = 3.0
 RADIUS, NARROW = 3, 1
-RATE, STEPS_OF_TRAINING = 1e-3, 6000
+RATE, STEPS_OF_TRAINING = 1e-3, 4000
 # Share of steps without features, and without differences, so that methods which record neither are served.
 WITHOUT = 0.25
 FLOOR = 1e-6

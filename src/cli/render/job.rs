@@ -1,11 +1,13 @@
 //! A render from the first sample to the written image.
 
+use std::path::Path;
 use std::time::Instant;
 
 use anyhow::Result;
 use fluxion::adaptive::{self, AdaptiveOutcome, AdaptiveSettings, Allocator, Limits, Start};
 use fluxion::film::{Frame, Needs, Provenance, exr};
 use fluxion::image::io::{DataWindow, failed_lookups};
+use fluxion::mattes::{self, MOST_SAMPLES};
 use fluxion::neighbours::Selector;
 use fluxion::reconstruct::{Reconstruction, Solution};
 use fluxion::reference::fingerprint;
@@ -57,6 +59,9 @@ impl Job<'_> {
             method::write(&args.method, &args.output, &solution, &frame, stats)?;
         }
         layers?;
+        if let Some(path) = &args.cryptomatte {
+            self.save_mattes(path, stats)?;
+        }
         if let Some(path) = &args.json {
             stats.save(path)?;
         }
@@ -152,6 +157,16 @@ impl Job<'_> {
         Ok(())
     }
 
+    /// Saves the shares of objects and materials, by as many samples as were taken.
+    fn save_mattes(&self, path: &Path, stats: &mut Stats) -> Result<()> {
+        let (start, sensor) = (Instant::now(), self.scene.sensor());
+        let mattes = mattes::mattes(self.scene, self.args.seed, stats.spp.clamp(1, MOST_SAMPLES));
+        let attributes = self.provenance(stats).attributes();
+        mattes::save(path, (sensor.width, sensor.height), &mattes, self.window(), attributes)?;
+        stats.seconds.write += start.elapsed().as_secs_f64();
+        Ok(())
+    }
+
     fn warn(&self, outcome: &RenderOutcome) {
         let args = self.args;
         if let Some((path, count)) = failed_lookups() {
@@ -178,10 +193,14 @@ impl Job<'_> {
 
     /// A frame with everything that files say of it.
     fn complete(&self, frame: Frame, stats: &Stats) -> Frame {
-        let window = self.scene.sensor().part().map(|(crop, full)| DataWindow { origin: (crop.x, crop.y), full });
         let mut frame = frame.with_provenance(self.provenance(stats));
-        frame.window = window;
+        frame.window = self.window();
         frame
+    }
+
+    /// The part of a film that is rendered.
+    fn window(&self) -> Option<DataWindow> {
+        self.scene.sensor().part().map(|(crop, full)| DataWindow { origin: (crop.x, crop.y), full })
     }
 
     /// Provenance of everything that is written.

@@ -91,6 +91,9 @@ pub struct Args {
     /// Record the radiance that an ambient light would add in the layers, by which `feature:ambient` sees unlit surfaces
     #[arg(long, requires = "layers")]
     ambient: bool,
+    /// EXR file of Cryptomatte layers: shares of pixels by objects and materials, named by their ids in the scene file
+    #[arg(long, value_name = "FILE")]
+    cryptomatte: Option<PathBuf>,
     /// Compute what scene, method and layers need, or everything, to see the savings
     #[arg(long, default_value = "needed", value_enum, value_name = "WHAT")]
     plan: Planned,
@@ -186,7 +189,11 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         // While the scene is read, too: what is to be resumed must not look as if it had failed.
         stop_on_signal()?;
     }
-    let _claims = Claims::new(&args.output, &[&args.layers, &args.json, &args.checkpoint.checkpoint], &[&args.scene])?;
+    let _claims = Claims::new(
+        &args.output,
+        &[&args.layers, &args.json, &args.cryptomatte, &args.checkpoint.checkpoint],
+        &[&args.scene],
+    )?;
     let mut stats = Stats { method: args.method.method.clone(), ..Stats::default() };
     let start = Instant::now();
     let mut scene = args.load()?;

@@ -30,9 +30,8 @@ pub const KERNEL: KernelKind = KernelKind {
 /// The trained network.
 const WEIGHTS: &[u8] = include_bytes!("learned.safetensors");
 
-/// How often the U-Net halves the picture, and the rows that it works on at a time.
+/// How often the U-Net halves the picture.
 const HALVINGS: usize = 3;
-const ROWS: usize = 128;
 
 /// Slope of leaky ReLU.
 const SLOPE: f32 = 0.01;
@@ -67,7 +66,7 @@ impl Network {
 
     /// Scores of the 24 steps, then logarithms of the weights of the pixel and across the steps, before they are bounded.
     fn apply(&self, encoded: &Tensor) -> Tensor {
-        let mut hidden = self.unet.apply(encoded, ROWS);
+        let mut hidden = self.unet.apply(encoded);
         hidden.data.par_iter_mut().for_each(|value| *value = value.max(SLOPE * *value));
         self.head[1].apply(&self.head[0].apply(&hidden))
     }

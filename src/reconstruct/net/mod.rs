@@ -60,9 +60,6 @@ const FEW: f32 = 32.0;
 /// How often the network halves the image.
 const HALVINGS: usize = 4;
 
-/// Rows that the network works on at a time.
-const ROWS: usize = 128;
-
 /// Bytes held for every pixel besides the frame, an upper bound.
 const BYTES: u64 = 900;
 
@@ -160,7 +157,7 @@ impl Reconstruction for Net {
         images.push(color.clone());
         let claimed = solution.error.as_ref().map(|error| inputs.mirrored(error, inputs.scale * inputs.scale));
         let claimed = claimed.unwrap_or_else(|| variance.clone());
-        let by_images = corrected(&images, &self.network.apply(&features(&inputs, &images, &claimed)?, ROWS));
+        let by_images = corrected(&images, &self.network.apply(&features(&inputs, &images, &claimed)?));
         (context.progress)("differences", 0.8);
         let claimed = mean(&claimed).map(|error| error.max(0.0).sqrt());
         let shown: Vec<_> = images.iter().collect();
@@ -252,7 +249,7 @@ mod tests {
         let [features, images, logits, output] = vectors(bytes, ["features", "images", "logits", "output"]);
         let network = UNet::new(&Weights::parse(WEIGHTS).unwrap(), "", HALVINGS).unwrap();
         assert_eq!((network.inputs(), network.multiple()), (features.channels, 16));
-        let made = network.apply(&features, ROWS);
+        let made = network.apply(&features);
         let largest = logits.data.iter().fold(0.0f32, |most, value| most.max(value.abs()));
         for (made, expected) in made.data.iter().zip(&logits.data) {
             assert!((made - expected).abs() < 1e-5 * largest, "{made} instead of {expected}");

@@ -150,12 +150,13 @@ fn single(object: &Object, loader: &mut Loader, (shape_number, emitter_number): 
     let plugin = find(shape::PLUGINS, object)?;
     let geometry = Arc::new((plugin.make)(object, loader)?);
     let (mut bsdf, mut radiance) = (None, None);
+    let mut material = "default".into();
     for property in object.nested() {
         let nested = loader.resolve(property)?;
         property.take();
         match nested.class.as_str() {
             "bsdf" if bsdf.is_some() => return Err(nested.loc.invalid("a second bsdf; a shape has one")),
-            "bsdf" => bsdf = Some(loader.bsdf(&nested)?),
+            "bsdf" => (bsdf, material) = (Some(loader.bsdf(&nested)?), name(&nested)),
             "emitter" if radiance.is_some() => {
                 return Err(nested.loc.invalid("a second emitter; a shape has one"));
             }
@@ -182,5 +183,14 @@ fn single(object: &Object, loader: &mut Loader, (shape_number, emitter_number): 
         Box::new(area) as Box<dyn Emitter>
     });
     let bsdf = bsdf.unwrap_or_else(|| bsdf::default(emitter.is_some()));
-    Ok(Some((Shape { geometry, bsdf, emitter: emitter.as_ref().map(|_| emitter_number) }, emitter)))
+    let (name, number) = (name(object), emitter.as_ref().map(|_| emitter_number));
+    Ok(Some((Shape { name, material, geometry, bsdf, emitter: number }, emitter)))
+}
+
+/// The id of an object, or its type and line in the file.
+fn name(object: &Object) -> Arc<str> {
+    match &object.id {
+        Some(id) => id.as_str().into(),
+        None => format!("{}_line_{}", object.plugin, object.loc.line).into(),
+    }
 }

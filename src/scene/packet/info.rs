@@ -29,7 +29,7 @@ pub struct ShapeInfo {
 impl ShapeInfo {
     /// The properties of a shape.
     pub fn new(shape: &Shape) -> Self {
-        let Shape { geometry, bsdf, emitter } = shape;
+        let Shape { geometry, bsdf, emitter, .. } = shape;
         let mesh = matches!(&**geometry, Geometry::Mesh(_)) && !bsdf.needs_derivatives();
         let surface = Surface::default();
         let closure = bsdf.closure(&surface.at, &|| surface);

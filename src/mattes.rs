@@ -1,0 +1,148 @@
+//! Cryptomatte (Friedman and Jones 2015): shares of pixels by named objects and materials, from which compositors pick mattes, and plain
+//! numbers of what a pixel shows most of.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::io::Cursor;
+use std::path::Path;
+use std::sync::Arc;
+
+use crate::error::Result;
+use crate::image::io::{DataWindow, Kind, Pixels, write};
+use crate::render::shown_shapes;
+use crate::scene::{Scene, Shape};
+
+/// Names that a pixel can have, in layers of two.
+const RANKS: usize = 6;
+
+/// Samples beyond which shares are no longer made more exact.
+pub const MOST_SAMPLES: u32 = 64;
+
+/// Shares of pixels by the names of one kind.
+pub struct Matte {
+    /// Name of the layers.
+    pub name: &'static str,
+    /// Identifiers by name.
+    pub ids: BTreeMap<Arc<str>, Id>,
+    /// Of every pixel, row by row, its names and their shares, the largest first.
+    pub pixels: Vec<Vec<(Arc<str>, f32)>>,
+}
+
+/// Identifiers of a name.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Id {
+    /// Of Cryptomatte.
+    pub hashed: f32,
+    /// Place among all names, from 1 on.
+    pub number: u32,
+}
+
+/// Names that shapes have of one kind.
+type Naming = (&'static str, fn(&Shape) -> &Arc<str>);
+
+/// The two kinds of names.
+const NAMINGS: [Naming; 2] = [("CryptoObject", |shape| &shape.name), ("CryptoMaterial", |shape| &shape.material)];
+
+/// Shares by objects and by materials, from the camera rays of `spp` samples of a seed.
+pub fn mattes(scene: &Scene, seed: u64, spp: u32) -> [Matte; 2] {
+    let shown = shown_shapes(scene, seed, spp);
+    NAMINGS.map(|(name, of)| {
+        let names: BTreeSet<_> = scene.shapes().iter().map(of).collect();
+        let id = |(number, name): (u32, &&Arc<str>)| (Arc::clone(name), Id { hashed: hashed(name), number });
+        let ids = (1..).zip(&names).map(id).collect();
+        let pixel = |shapes: &Vec<(u32, u32)>| {
+            let mut counts = BTreeMap::new();
+            for &(shape, count) in shapes {
+                *counts.entry(Arc::clone(of(&scene.shapes()[shape as usize]))).or_insert(0) += count;
+            }
+            let mut shares: Vec<_> =
+                counts.into_iter().map(|(name, count)| (name, count as f32 / spp as f32)).collect();
+            // Stable, so that of equal shares the name decides.
+            shares.sort_by(|a, b| b.1.total_cmp(&a.1));
+            shares
+        };
+        Matte { name, ids, pixels: shown.iter().map(pixel).collect() }
+    })
+}
+
+/// The identifier of a name: its hash as a float, made neither infinite nor denormal nor not a number.
+fn hashed(name: &str) -> f32 {
+    let hash = hash(name);
+    f32::from_bits(if matches!(hash >> 23 & 255, 0 | 255) { hash ^ 1 << 23 } else { hash })
+}
+
+fn hash(name: &str) -> u32 {
+    murmur3::murmur3_32(&mut Cursor::new(name), 0).expect("memory can be read")
+}
+
+impl Matte {
+    /// Pairs of identifier and share of every rank, then the number of the first name in the order of all, from 1 on.
+    fn put(&self, pixel: usize, to: &mut Vec<f32>) {
+        let shares = &self.pixels[pixel];
+        for rank in 0..RANKS {
+            let found = shares.get(rank).map(|(name, share)| [self.ids[name].hashed, *share]);
+            to.extend(found.unwrap_or_default());
+        }
+        to.push(shares.first().map_or(0.0, |(name, _)| self.ids[name].number as f32));
+    }
+
+    fn channels(&self) -> Vec<String> {
+        let of_layer = |layer: usize| ["R", "G", "B", "A"].map(|channel| format!("{}{layer:02}.{channel}", self.name));
+        (0..RANKS / 2).flat_map(of_layer).chain([self.number_channel()]).collect()
+    }
+
+    /// The channel of numbers: `object.id` or `material.id`.
+    fn number_channel(&self) -> String {
+        format!("{}.id", self.name.trim_start_matches("Crypto").to_lowercase())
+    }
+
+    /// The names as the format has them, and those of the numbers.
+    fn attributes(&self) -> Vec<(String, String)> {
+        let key = &format!("{:08x}", hash(self.name))[..7];
+        let manifest: serde_json::Map<_, _> = self
+            .ids
+            .iter()
+            .map(|(name, id)| (name.to_string(), format!("{:08x}", id.hashed.to_bits()).into()))
+            .collect();
+        let names: Vec<_> = self.ids.keys().map(|name| &**name).collect();
+        let values = [
+            ("name", self.name.to_owned()),
+            ("hash", "MurmurHash3_32".to_owned()),
+            ("conversion", "uint32_to_float32".to_owned()),
+            ("manifest", serde_json::Value::from(manifest).to_string()),
+        ];
+        let of_format = values.map(|(what, value)| (format!("cryptomatte/{key}/{what}"), value));
+        let numbers = (format!("fluxion:{}", self.number_channel()), serde_json::json!(names).to_string());
+        of_format.into_iter().chain([numbers]).collect()
+    }
+}
+
+/// Writes mattes as an EXR file, with more attributes.
+pub fn save(
+    path: &Path,
+    (width, height): (usize, usize),
+    mattes: &[Matte],
+    window: Option<DataWindow>,
+    mut attributes: Vec<(String, String)>,
+) -> Result<()> {
+    let mut data = Vec::new();
+    for pixel in 0..width * height {
+        mattes.iter().for_each(|matte| matte.put(pixel, &mut data));
+    }
+    attributes.extend(mattes.iter().flat_map(Matte::attributes));
+    let channels = mattes.iter().flat_map(Matte::channels).collect();
+    write(path, &Pixels { width, height, channels, data, window, attributes }, Kind::Float, Some("zip"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn identifiers_are_those_of_the_hash_and_always_numbers() {
+        // Known values of MurmurHash3 for 32 bits with a seed of 0.
+        assert_eq!((hash(""), hash("hello"), hash("hello, world")), (0, 0x248b_fa47, 0x149b_bb7f));
+        // An exponent of zeros, which would make a number that is flushed to zero.
+        assert_eq!(hashed("").to_bits(), 1 << 23);
+        assert!((0..100_000).all(|k| hashed(&format!("object {k}")).is_normal()));
+    }
+}

@@ -1,0 +1,71 @@
+//! Shapes that the camera sees, and their shares of pixels.
+
+use rayon::prelude::*;
+
+use super::camera::CameraSamples;
+use crate::film::TILE;
+use crate::math::lanes::{LANES, Mask};
+use crate::math::rng;
+use crate::scene::bsdf::Lobe;
+use crate::scene::packet::Surfaces;
+use crate::scene::{Ray, Scene, Surface};
+
+/// Shapes that a pixel shows, by their numbers, and how many of its samples show each.
+pub type ShownShapes = Vec<(u32, u32)>;
+
+/// Surfaces that are passed before one counts whatever its material: more is a mistake of rounding.
+const MOST_PASSED: u32 = 256;
+
+/// Shapes of all pixels, row by row, by the camera rays of samples 0 to `spp`. Rays pass holes as often as light does.
+pub fn shown_shapes(scene: &Scene, seed: u64, spp: u32) -> Vec<ShownShapes> {
+    let (width, height) = (scene.sensor().width, scene.sensor().height);
+    let rows = (0..height).step_by(TILE).collect::<Vec<_>>();
+    let of_rows = |&top: &usize| {
+        let bottom = (top + TILE).min(height);
+        let pixels: Vec<_> = (top..bottom).flat_map(|y| (0..width).map(move |x| (x, y))).collect();
+        let mut shown = vec![ShownShapes::new(); pixels.len()];
+        let mut surfaces = Surfaces::default();
+        for index in 0..spp {
+            let camera = CameraSamples::new(scene, seed, index, &pixels);
+            for first in (0..pixels.len()).step_by(LANES) {
+                let hashes = camera.hashes(first);
+                let rays = camera.rays(scene, first, hashes, &[]);
+                let active = Mask::first(pixels.len() - first);
+                let mut hit = scene.intersect_packet(&rays, active, true, &mut surfaces);
+                if scene.integrator().pass_emitters {
+                    scene.pass_emitters(&rays, &mut hit, &mut surfaces);
+                }
+                for lane in hit.lanes() {
+                    let mut shape = Some(surfaces.shape.0[lane]);
+                    if scene.shapes()[surfaces.shape.0[lane] as usize].bsdf.transmits() {
+                        let (surface, hash) = (surfaces.get(lane), u64::from(hashes.0[lane]) << 32 | u64::from(index));
+                        shape = behind_holes(scene, rays.get(lane), surface, hash);
+                    }
+                    let Some(shape) = shape else { continue };
+                    let of_pixel = &mut shown[first + lane];
+                    match of_pixel.iter_mut().find(|(other, _)| *other == shape) {
+                        Some((_, count)) => *count += 1,
+                        None => of_pixel.push((shape, 1)),
+                    }
+                }
+            }
+        }
+        shown
+    };
+    rows.par_iter().flat_map_iter(of_rows).collect()
+}
+
+/// The shape that a ray shows from a surface on, whose holes it passes by chance.
+fn behind_holes(scene: &Scene, mut ray: Ray, mut surface: Surface, hash: u64) -> Option<u32> {
+    for passed in 0..MOST_PASSED {
+        let hole = scene.bsdf(&surface).delta(&surface, surface.wi, Lobe::Null);
+        let chance = hole.map_or(0.0, |hole| hole.probability);
+        if rng::unit(rng::combine(hash, u64::from(passed))) >= chance {
+            break;
+        }
+        let origin = surface.leave(ray.direction);
+        ray = Ray { origin, t_far: ray.t_far - origin.distance(ray.origin), ..ray };
+        surface = scene.intersect_from_camera(ray)?;
+    }
+    Some(surface.at.shape)
+}
