@@ -20,9 +20,9 @@ import numpy as np
 import exr
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
-FLUXION = os.path.join(ROOT, "target", "release", "fluxion")
+FLUXION = os.environ.get("FLUXION", os.path.join(ROOT, "target", "release", "fluxion"))
 BUNDLED = ["cornell-box", "door-ajar", "glossy-metal", "glass-caustic"]
-PUBLIC = ["kitchen", "veach-ajar", "veach-mis"]
+PUBLIC = ["kitchen", "veach-ajar", "veach-mis", "staircase", "living-room", "classroom"]
 EPSILON = 0.01
 
 
@@ -99,9 +99,13 @@ def gain(cases, spp, methods):
     print("|---" * (len(cases) + 2) + "|")
     for method in methods:
         uniform = [case.errors(case.render("--spp", spp, "--method", method)[0]).mean() for case in cases]
-        for allocator in ["predicted_error", "variance"]:
-            adaptive = [case.errors(case.render("--spp", spp, "--method", method, "--adaptive", allocator)[0]).mean()
-                        for case in cases]
+        for allocator in ["predicted_error", "variance", "learned"]:
+            try:
+                adaptive = [case.errors(case.render("--spp", spp, "--method", method, "--adaptive", allocator)[0]).mean()
+                            for case in cases]
+            except subprocess.CalledProcessError:
+                # The method does not estimate its error.
+                continue
             ratios = np.array(adaptive) / uniform
             mean = np.exp(np.log(ratios).mean())
             print(f"| {method}, {allocator} | " + " | ".join(f"{r:.2f}" for r in ratios) + f" | {mean:.2f} |", flush=True)

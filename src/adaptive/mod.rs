@@ -15,6 +15,7 @@ mod budget;
 mod estimate;
 mod goals;
 mod journal;
+mod learned;
 mod predicted_error;
 mod run;
 mod uniform;
@@ -53,7 +54,8 @@ pub trait Allocator: Sync {
 }
 
 /// Every allocator, the default first.
-pub const ALLOCATORS: &[&dyn Allocator] = &[&predicted_error::PredictedError, &variance::Variance, &uniform::Uniform];
+pub const ALLOCATORS: &[&dyn Allocator] =
+    &[&predicted_error::PredictedError, &variance::Variance, &learned::Learned, &uniform::Uniform];
 
 /// The allocator of a name.
 pub fn allocator(id: &str) -> Result<&'static dyn Allocator> {
@@ -85,7 +87,7 @@ pub fn parse(text: &str) -> Result<(&str, Option<&'static dyn Allocator>)> {
 }
 
 /// A pass that has ended.
-#[derive(JsonSchema, Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Pass {
     /// Mean samples per pixel after it.
     pub spp: f64,

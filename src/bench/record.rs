@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use crate::error::{Error, Result};
 
 /// Wall-clock seconds of the stages of a run.
-#[derive(JsonSchema, Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Seconds {
     /// Reading the scene and building the hierarchy, once for all runs; not part of the total.
     pub load: f64,
@@ -24,7 +24,7 @@ pub struct Seconds {
 }
 
 /// One run.
-#[derive(JsonSchema, Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Record {
     /// Name of the scene.
     pub scene: String,
@@ -77,7 +77,7 @@ impl Record {
 }
 
 /// A run that was not worth starting, or failed.
-#[derive(JsonSchema, Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct LeftOut {
     /// Name of the scene.
     pub scene: String,
@@ -90,7 +90,7 @@ pub struct LeftOut {
 }
 
 /// All runs so far.
-#[derive(JsonSchema, Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Results {
     /// Runs that were made.
     pub records: Vec<Record>,

@@ -50,7 +50,7 @@ struct Lines {
 }
 
 /// A line of progress for programs.
-#[derive(JsonSchema, Serialize)]
+#[derive(Serialize, JsonSchema)]
 pub struct Line {
     /// Work that is under way.
     stage: String,

@@ -11,7 +11,7 @@ use serde::Serialize;
 use super::outputs::write_json;
 
 /// Wall-clock seconds of the stages.
-#[derive(JsonSchema, Clone, Copy, Debug, Default, Serialize)]
+#[derive(Clone, Copy, Debug, Default, Serialize, JsonSchema)]
 pub struct Seconds {
     /// Reading the scene or the layers, building the hierarchy.
     pub load: f64,
@@ -26,7 +26,7 @@ pub struct Seconds {
 }
 
 /// The object that `--json` writes.
-#[derive(JsonSchema, Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug, Default, Serialize, JsonSchema)]
 pub struct Stats {
     /// Time per stage.
     pub seconds: Seconds,

@@ -13,7 +13,7 @@ use crate::image::npy::{self, Number};
 use crate::reconstruct::Solution;
 
 /// Arrangement of the files.
-#[derive(JsonSchema, Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Layout {
     /// Arrays of height, width and channels for NumPy: `NAME_0016spp.npy` with all layers, `NAME_ref.npy`.

@@ -29,7 +29,7 @@ use crate::render::{Budget, Control, RenderOutcome, RenderSettings, render, resu
 use crate::scene::Scene;
 
 /// Settings of a set of frames, the same for all of them.
-#[derive(JsonSchema, Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Recipe {
     /// Numbers of samples per pixel, rising. Each has those before as its first samples.
     pub spp: Vec<u32>,
@@ -54,7 +54,7 @@ pub struct Recipe {
 }
 
 /// Everything to know about a frame: `NAME.json`, written when all of its files are there.
-#[derive(JsonSchema, Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Manifest {
     /// Name of the frame, with which its files begin.
     pub name: String,

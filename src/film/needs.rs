@@ -7,7 +7,7 @@ use super::statistic::STATISTICS;
 use super::tile::CROSS;
 
 /// Statistics that a method asks for besides the colour, or that a film records.
-#[derive(JsonSchema, Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Needs {
     /// Albedo, normal and depth with their variances.
     pub features: bool,
@@ -27,7 +27,7 @@ pub struct Needs {
 }
 
 /// How a film gets the differences between pixels.
-#[derive(JsonSchema, Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum EdgeNeed {
     /// There are none.

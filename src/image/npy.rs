@@ -11,7 +11,7 @@ use crate::error::Result;
 use crate::files;
 
 /// Type of the numbers in a file.
-#[derive(JsonSchema, Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Number {
     /// 32 bits.

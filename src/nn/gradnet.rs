@@ -110,14 +110,21 @@ impl GradNet {
             let more = b.apply(&a.apply(&at));
             at.data.iter_mut().zip(&more.data).for_each(|(value, more)| *value += more);
         }
-        for layer in &self.decoder {
+        let (doubling, finest) = self.decoder.split_at(LEVELS - 1);
+        let mut beside = |at: &Tensor| {
             let (data, gradient) = skips.pop().expect("as many as levels");
-            at = layer.apply(&Tensor::concat(&[&at, &data, &gradient]));
+            Tensor::concat(&[at, &data, &gradient])
+        };
+        for layer in doubling {
+            at = layer.apply(&beside(&at));
         }
-        if let Some([first, last]) = &self.near {
-            at = last.apply(&Tensor::concat(&[&at, &first.apply(both)]));
-        }
-        self.out.apply(&at)
+        let (at, finest) = (beside(&at), &finest[0]);
+        let Some([first, last]) = &self.near else { return self.out.apply(&finest.apply(&at)) };
+        // At full size nothing is copied.
+        let mut whole = Tensor::new(both.width, both.height, finest.outputs() + first.outputs());
+        finest.apply_into(&at, &mut whole, 0);
+        first.apply_into(both, &mut whole, finest.outputs());
+        self.out.apply(&last.apply(&whole))
     }
 }
 

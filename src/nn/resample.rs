@@ -13,10 +13,13 @@ pub fn max_pool(input: &Tensor) -> Tensor {
     })
 }
 
-/// Every pixel four times.
-pub fn nearest(input: &Tensor) -> Tensor {
-    Tensor::from_fn(2 * input.width, 2 * input.height, input.channels, |x, y, pixel| {
-        pixel.copy_from_slice(input.pixel(x / 2, y / 2));
+/// Every pixel four times, before the channels of a tensor of that size.
+pub fn nearest_beside(input: &Tensor, other: &Tensor) -> Tensor {
+    assert_eq!((2 * input.width, 2 * input.height), (other.width, other.height), "twice the size");
+    Tensor::from_fn(other.width, other.height, input.channels + other.channels, |x, y, pixel| {
+        let (own, beside) = pixel.split_at_mut(input.channels);
+        own.copy_from_slice(input.pixel(x / 2, y / 2));
+        beside.copy_from_slice(other.pixel(x, y));
     })
 }
 

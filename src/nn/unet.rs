@@ -2,7 +2,7 @@
 //! (Ronneberger et al. 2015).
 
 use super::convolution::{Activation, Convolution};
-use super::resample::{max_pool, nearest};
+use super::resample::{max_pool, nearest_beside};
 use super::tensor::{Tensor, band_rows, in_bands};
 use super::weights::Weights;
 
@@ -89,7 +89,7 @@ impl UNet {
         at = self.middle.apply(&at);
         for layer in &self.up {
             let skip = skips.pop().expect("as many as halvings");
-            at = layer.apply(&Tensor::concat(&[&nearest(&at), &skip]));
+            at = layer.apply(&nearest_beside(&at, &skip));
         }
         self.out.apply(&self.last.apply(&at))
     }

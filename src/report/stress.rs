@@ -8,7 +8,7 @@ use serde::Serialize;
 use crate::stress::{Check, Checks};
 
 /// A case that was tried.
-#[derive(JsonSchema, Serialize)]
+#[derive(Serialize, JsonSchema)]
 pub struct Row {
     /// Kind and name.
     pub name: &'static str,

@@ -46,7 +46,7 @@ struct Array {
 }
 
 /// The description that `samples.json` holds.
-#[derive(JsonSchema, Serialize)]
+#[derive(Serialize, JsonSchema)]
 pub struct Description {
     /// Version of Fluxion.
     version: String,
@@ -71,7 +71,7 @@ pub struct Description {
 }
 
 /// A file of the folder.
-#[derive(JsonSchema, Serialize)]
+#[derive(Serialize, JsonSchema)]
 pub struct Entry {
     /// Name of the file.
     file: String,

@@ -27,7 +27,7 @@ pub struct Case {
 }
 
 /// A measured figure and its bound.
-#[derive(JsonSchema, Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Check {
     /// Subject of the figure: a method, a solver, a shift.
     pub subject: String,
@@ -47,7 +47,7 @@ impl Check {
 }
 
 /// Figures of a case.
-#[derive(JsonSchema, Debug, Default, Serialize)]
+#[derive(Debug, Default, Serialize, JsonSchema)]
 pub struct Checks {
     /// In the order in which they were made.
     pub list: Vec<Check>,

@@ -38,13 +38,17 @@ fn layers_are_those_of_pytorch() {
         ("dense", convolution("dense", 1)),
         ("double", Box::new(move |input| double.apply(input))),
         ("pool", Box::new(resample::max_pool)),
-        ("nearest", Box::new(resample::nearest)),
+        ("nearest", Box::new(nearest)),
         ("bilinear", Box::new(resample::bilinear)),
     ];
     for (name, layer) in layers {
         let made = layer(&tensor(&weights, &format!("{name}.input")));
         assert_near(&made, &tensor(&weights, &format!("{name}.output")), name);
     }
+}
+
+fn nearest(input: &Tensor) -> Tensor {
+    resample::nearest_beside(input, &Tensor::new(2 * input.width, 2 * input.height, 0))
 }
 
 #[test]
@@ -83,7 +87,7 @@ fn bits_are_the_same_on_any_number_of_threads_and_in_bands() {
     let layer = |dilation| Convolution::new((8, 8, 3), dilation, &weights, &[0.1; 8], LEAKY);
     let network = |input: &Tensor| {
         let pooled = resample::max_pool(&layer(1).apply(input));
-        layer(2).apply(&resample::nearest(&pooled))
+        layer(2).apply(&nearest(&pooled))
     };
     let input = Tensor::from_fn(30, 46, 8, |x, y, pixel| {
         pixel.iter_mut().enumerate().for_each(|(c, value)| *value = ((x * 7 + y * 13 + c * 5) % 11) as f32 - 5.0);

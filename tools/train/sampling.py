@@ -7,7 +7,7 @@
 FRAMES is a folder of `fluxion dataset --spp 8,16,32,64,128 --layers features,gradients --target l2`; ten of every hundred scenes are kept
 apart for tests. A frame of any sample counts is put together of groups of samples of 8, 16, 32 and 64, and goes through control variates;
 what a further sample changes is taken to be the distance to the target over the number of samples (Kuznetsov et al. 2018). `export` writes
-src/adaptive/learned.safetensors if the gate holds: on the scenes kept apart less error than even samples.
+src/adaptive/learned/learned.safetensors if the gate holds: on the scenes kept apart less error than even samples.
 """
 import json
 import os
@@ -65,7 +65,7 @@ def box_mean(image, radius):
 
 
 def inputs_of(pilot):
-    """What the network sees of a frame, in the order of src/adaptive/learned.rs."""
+    """What the network sees of a frame, in the order of src/adaptive/learned/mod.rs."""
     single = PILOT ** 0.5
     deviation = lambda name, channels: single * planes(pilot.get(name + "_sigma", channels))
     of_colour = (single * planes(pilot.radiance("sigma"))).mean(0, keepdim=True)
@@ -237,7 +237,7 @@ def export(options):
     net = net.half().float()
     recipe = {"steps": steps, "rate": RATE, "seed": options.seed}
     save_file({name: value.half().contiguous() for name, value in net.state_dict().items()},
-              os.path.join(kernels.TOP, "src/adaptive/learned.safetensors"), {"recipe": json.dumps(recipe)})
+              os.path.join(kernels.TOP, "src/adaptive/learned/learned.safetensors"), {"recipe": json.dumps(recipe)})
     inputs = apart[0].inputs[:, :16, :24]
     with torch.no_grad():
         output = net(inputs)

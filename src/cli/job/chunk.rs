@@ -121,6 +121,7 @@ impl Job {
             Err(error) => bail!(Error::Usage(format!("options of the chunks: {error}"))),
         }
     }
+
     /// The checkpoint of a complete chunk.
     pub fn complete(&self, number: usize) -> PathBuf {
         self.folder.join(format!("{number:04}.ckpt"))

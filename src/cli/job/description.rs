@@ -18,7 +18,7 @@ const FORMAT: u32 = 1;
 const DIGITS: usize = 4;
 
 /// A job, as `job.json` holds it.
-#[derive(JsonSchema, Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct Job {
     format: u32,
     /// Version of the program: samples of the same number are the same in one version only.
@@ -50,7 +50,7 @@ pub struct Job {
 }
 
 /// The round of even samples of an adaptive job.
-#[derive(JsonSchema, Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct FirstRound {
     /// Name of the allocator that allocates the second round.
     allocator: String,

@@ -56,7 +56,7 @@ EOF
 step() {{
 	name=$1
 	shift
-	FLUXION_STEP="$name" sbatch --parsable --job-name="fluxion-$name" --open-mode=append --output="$job/slurm-$name.log" "$@" <<'EOF'
+	FLUXION_STEP="$name" sbatch --export=ALL --parsable --job-name="fluxion-$name" --open-mode=append --output="$job/slurm-$name.log" "$@" <<'EOF'
 #!/bin/sh
 case $FLUXION_STEP in
 allocate) exec srun fluxion job allocate {job} ;;

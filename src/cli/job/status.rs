@@ -28,7 +28,7 @@ pub struct Args {
 }
 
 /// Numbers of chunks by their states.
-#[derive(JsonSchema, Default, Serialize)]
+#[derive(Default, Serialize, JsonSchema)]
 pub struct Status {
     chunks: usize,
     complete: usize,
