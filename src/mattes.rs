@@ -23,16 +23,16 @@ pub struct Matte {
     pub name: &'static str,
     /// Identifiers by name.
     pub ids: BTreeMap<Arc<str>, Id>,
-    /// Of every pixel, row by row, its names and their shares, the largest first.
+    /// Names of every pixel with their shares, the largest first; pixels are row by row.
     pub pixels: Vec<Vec<(Arc<str>, f32)>>,
 }
 
 /// Identifiers of a name.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Id {
-    /// Of Cryptomatte.
+    /// Identifier of Cryptomatte.
     pub hashed: f32,
-    /// Place among all names, from 1 on.
+    /// Number among all names in their order, from 1 on.
     pub number: u32,
 }
 

@@ -110,6 +110,8 @@ mod tests {
             split("apr:features=albedo+normal+adaptive=variance").unwrap(),
             ("apr:features=albedo+normal", Some("variance"))
         );
-        assert!(split("apr+adaptive=x").unwrap_err().to_string().contains("predicted_error, variance, uniform"));
+        assert!(
+            split("apr+adaptive=x").unwrap_err().to_string().contains("predicted_error, variance, learned, uniform")
+        );
     }
 }

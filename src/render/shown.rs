@@ -38,8 +38,9 @@ pub fn shown_shapes(scene: &Scene, seed: u64, spp: u32) -> Vec<ShownShapes> {
                 for lane in hit.lanes() {
                     let mut shape = Some(surfaces.shape.0[lane]);
                     if scene.shapes()[surfaces.shape.0[lane] as usize].bsdf.transmits() {
-                        let (surface, hash) = (surfaces.get(lane), u64::from(hashes.0[lane]) << 32 | u64::from(index));
-                        shape = behind_holes(scene, rays.get(lane), surface, hash);
+                        let (x, y) = pixels[first + lane];
+                        let hash = rng::combine(seed, (y * width + x) as u64);
+                        shape = behind_holes(scene, rays.get(lane), surfaces.get(lane), (hash, index));
                     }
                     let Some(shape) = shape else { continue };
                     let of_pixel = &mut shown[first + lane];
@@ -55,12 +56,15 @@ pub fn shown_shapes(scene: &Scene, seed: u64, spp: u32) -> Vec<ShownShapes> {
     rows.par_iter().flat_map_iter(of_rows).collect()
 }
 
-/// The shape that a ray shows from a surface on, whose holes it passes by chance.
-fn behind_holes(scene: &Scene, mut ray: Ray, mut surface: Surface, hash: u64) -> Option<u32> {
+/// The golden ratio's share of one, by which numbers that follow each other are spread evenly.
+const GOLDEN: f32 = 0.618_034;
+
+/// The shape that a ray shows from a surface on, whose holes it passes by chance. Sample number `index` of a pixel with its own `hash`.
+fn behind_holes(scene: &Scene, mut ray: Ray, mut surface: Surface, (hash, index): (u64, u32)) -> Option<u32> {
     for passed in 0..MOST_PASSED {
         let hole = scene.bsdf(&surface).delta(&surface, surface.wi, Lobe::Null);
         let chance = hole.map_or(0.0, |hole| hole.probability);
-        if rng::unit(rng::combine(hash, u64::from(passed))) >= chance {
+        if (rng::unit(rng::combine(hash, u64::from(passed))) + GOLDEN * index as f32).fract() >= chance {
             break;
         }
         let origin = surface.leave(ray.direction);

@@ -96,7 +96,7 @@ fn schemas_are_those_of_what_is_written() {
     output(at, &["job", "plan", &cornell, "--spp", "32", "--chunks", "2", "--adaptive", "variance", "-o", "j"]);
     let bench = ["bench", &cornell, "--spp", "2", "--seeds", "1", "--methods", "primal", "-o", "b", "-q"];
     output(at, &bench);
-    output(at, &["stress", "frames/black", "--json", "stress.json"]);
+    output(at, &["stress", "--filter", "frames/black", "--json", "stress.json"]);
     let file = |path: &str| std::fs::read_to_string(at.join(path)).unwrap();
     let progress =
         fluxion(at).args(["render", &cornell, "-o", "p.exr", "--progress", "json"]).args(&small[..4]).output();

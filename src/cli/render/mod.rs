@@ -222,9 +222,6 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         return replay(args, &scene, sample);
     }
     let origin = args.checkpoint.checkpoint.as_ref().map(|_| origin(args, &scene, &plan, kernel)).transpose()?;
-    if origin.as_ref().is_some_and(|origin| args.content.as_ref().is_some_and(|known| origin.content != *known)) {
-        bail!(Error::mismatch(&args.scene, "has changed since the plan was made, or a file that it names: plan anew"));
-    }
     let goals = goals(args, &scene)?;
     let journal = Mutex::default();
     let start = match origin.as_ref().map(|origin| args.checkpoint.load(origin)).transpose()?.flatten() {
@@ -232,9 +229,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         None => Start { render: RenderOutcome::new(&scene, plan.needs), journal: &journal },
     };
     let sink = origin.zip(lock).and_then(|(origin, lock)| args.checkpoint.sink(origin, &start, lock));
-    let name = args.output.first().unwrap_or(&args.scene).display().to_string();
-    let size = (scene.sensor().width, scene.sensor().height);
-    let viewer = args.display.as_ref().map(|address| Viewer::new(address, &name, size)).transpose()?;
+    let viewer = viewer(args, &scene)?;
     let (scene, method, sink, viewer) = (&scene, method.as_ref(), sink.as_ref(), viewer.as_ref());
     let done = Job { args, scene, method, allocator, kernel, goals, sink, viewer }.run(start, &mut stats);
     match sink {
@@ -281,12 +276,23 @@ fn saved(args: &Args, needed: Needs) -> Needs {
     }
 }
 
-/// Origin of the film that is going to be rendered.
+/// The viewer that is to show the image, if there is one.
+fn viewer(args: &Args, scene: &Scene) -> Result<Option<Viewer>> {
+    let name = args.output.first().unwrap_or(&args.scene).display().to_string();
+    let size = (scene.sensor().width, scene.sensor().height);
+    args.display.as_ref().map(|address| Viewer::new(address, &name, size)).transpose()
+}
+
+/// Origin of the film that is going to be rendered. The error says that the scene is not the one that is expected.
 fn origin(args: &Args, scene: &Scene, plan: &Plan, kernel: Selector) -> Result<Origin> {
+    let content = content(scene)?;
+    if args.content.as_ref().is_some_and(|known| *known != content) {
+        bail!(Error::mismatch(&args.scene, "has changed since the plan was made, or a file that it names: plan anew"));
+    }
     Ok(Origin {
         version: env!("CARGO_PKG_VERSION").into(),
         scene: args.scene.file_name().unwrap_or_default().to_string_lossy().into_owned(),
-        content: content(scene)?,
+        content,
         fingerprint: fingerprint(scene),
         method: args.method.method.clone(),
         plan: plan.summary(),

@@ -45,7 +45,7 @@ pub const METHOD: Method = Method {
 };
 
 /// Bytes held for every pixel besides the frame while images are mixed, an upper bound.
-const BYTES: u64 = 900;
+const BYTES: u64 = 1150;
 
 /// The same while a method works: of its intermediate images, and of every finished candidate.
 const NOTES: u64 = 80;

@@ -50,7 +50,7 @@ pub const METHOD: Method = Method {
 const WEIGHTS: &[u8] = include_bytes!("own.safetensors");
 
 /// Bytes held for every pixel besides the frame, and while the network works on a band: an upper bound.
-const BYTES: u64 = 600;
+const BYTES: u64 = 700;
 
 /// Largest number of samples that the network was trained for.
 const TRAINED: f32 = 64.0;

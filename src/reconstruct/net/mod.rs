@@ -61,7 +61,7 @@ const FEW: f32 = 32.0;
 const HALVINGS: usize = 4;
 
 /// Bytes held for every pixel besides the frame, an upper bound.
-const BYTES: u64 = 900;
+const BYTES: u64 = 1150;
 
 struct Net {
     frgr: Box<dyn Reconstruction>,
