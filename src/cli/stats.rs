@@ -43,10 +43,10 @@ pub struct Stats {
     /// Summary of the plan.
     pub plan: String,
     /// Neighbours that paths were shifted to, if not the cross.
-    #[serde(skip_serializing_if = "String::is_empty")]
+    #[serde(default, skip_serializing_if = "String::is_empty")]
     pub kernel: String,
     /// Passes of adaptive sampling.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub passes: Vec<Pass>,
 }
 
