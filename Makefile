@@ -6,7 +6,7 @@ PACKAGES = g++ pkg-config libclang-dev libembree-dev libopenimageio-dev
 TEST_PACKAGES = chromium
 SCENE = scenes/cornell-box/scene.xml
 
-.PHONY: demo test packages check licences memcheck train-net train-blend train-gradnet train-kernels train-sampling
+.PHONY: demo test packages check licences memcheck train-net train-blend train-gradnet train-kernels
 
 demo: packages
 	cargo build --release
@@ -42,7 +42,7 @@ memcheck: packages
 	tools/memcheck/run
 
 # Weights of learned methods from nothing, in training/: hours, resumable. Building and using Fluxion needs none of it.
-train-net train-blend train-gradnet train-kernels train-sampling: packages
+train-net train-blend train-gradnet train-kernels: packages
 	@sh .ci/packages python3-venv
 	cargo build --release
 	tools/train/train.sh $(@:train-%=%) training

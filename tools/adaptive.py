@@ -99,7 +99,7 @@ def gain(cases, spp, methods):
     print("|---" * (len(cases) + 2) + "|")
     for method in methods:
         uniform = [case.errors(case.render("--spp", spp, "--method", method)[0]).mean() for case in cases]
-        for allocator in ["predicted_error", "variance", "learned"]:
+        for allocator in ["predicted_error", "variance"]:
             try:
                 adaptive = [case.errors(case.render("--spp", spp, "--method", method, "--adaptive", allocator)[0]).mean()
                             for case in cases]

@@ -15,7 +15,6 @@ mod budget;
 mod estimate;
 mod goals;
 mod journal;
-mod learned;
 mod predicted_error;
 mod run;
 mod uniform;
@@ -29,7 +28,7 @@ pub use self::goals::{Goals, first_round};
 pub use self::journal::{Journal, Notes, PreviousPass};
 pub use self::run::{AdaptiveOutcome, AdaptiveSettings, Start, resume, run};
 use crate::error::{Error, Result};
-use crate::film::{Frame, Needs};
+use crate::film::Frame;
 use crate::reconstruct::{Reconstruction, Solution};
 
 /// A measure of where samples are needed.
@@ -43,19 +42,13 @@ pub trait Allocator: Sync {
     /// Whether it needs a reconstruction with an estimated error.
     fn needs_error(&self) -> bool;
 
-    /// Statistics that it uses, if the film records them, besides the colours.
-    fn needs(&self) -> Needs {
-        Needs::default()
-    }
-
     /// For every pixel the standard deviation of a single sample, in any unit: the best number of samples is proportional
     /// to it (Neyman 1934). `solution` is there if [`Allocator::needs_error`].
     fn need(&self, frame: &Frame, solution: Option<&Solution>) -> Result<Vec<f32>>;
 }
 
 /// Every allocator, the default first.
-pub const ALLOCATORS: &[&dyn Allocator] =
-    &[&predicted_error::PredictedError, &variance::Variance, &learned::Learned, &uniform::Uniform];
+pub const ALLOCATORS: &[&dyn Allocator] = &[&predicted_error::PredictedError, &variance::Variance, &uniform::Uniform];
 
 /// The allocator of a name.
 pub fn allocator(id: &str) -> Result<&'static dyn Allocator> {
@@ -110,8 +103,6 @@ mod tests {
             split("apr:features=albedo+normal+adaptive=variance").unwrap(),
             ("apr:features=albedo+normal", Some("variance"))
         );
-        assert!(
-            split("apr+adaptive=x").unwrap_err().to_string().contains("predicted_error, variance, learned, uniform")
-        );
+        assert!(split("apr+adaptive=x").unwrap_err().to_string().contains("predicted_error, variance, uniform"));
     }
 }

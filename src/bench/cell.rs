@@ -89,8 +89,7 @@ impl<'a> Runner<'a> {
     pub fn new(case: &'a Case, method: &'a str) -> Result<Self> {
         let (id, allocator) = adaptive::parse(method)?;
         let made = reconstruct::parse(id)?;
-        let needs = allocator.map_or(made.needs(), |allocator| made.needs().union(allocator.needs()));
-        let needs = Plan::new(&case.scene, needs, Needs::default()).needs;
+        let needs = Plan::new(&case.scene, made.needs(), Needs::default()).needs;
         Ok(Self { case, method, made, allocator, needs })
     }
 

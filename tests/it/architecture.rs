@@ -19,7 +19,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("render", &["scene", "film", "plan", "neighbours", "image", "math"]),
     ("nn", &["math"]),
     ("reconstruct", &["film", "image", "nn", "solve", "math"]),
-    ("adaptive", &["scene", "render", "film", "nn", "reconstruct", "image", "math"]),
+    ("adaptive", &["scene", "render", "film", "reconstruct", "image", "math"]),
     ("checkpoint", &["scene", "render", "film", "neighbours", "adaptive", "image", "math", "files"]),
     ("dataset", &["scene", "plan", "film", "render", "image", "reconstruct", "reference", "math", "files"]),
     ("samples", &["scene", "film", "render", "image", "math", "files"]),

@@ -2,7 +2,7 @@
 # Everything from nothing to the weights of a method: models, scenes, frames, training, gates. What is there is kept, so an
 # interrupted run goes on. Takes hours; FOLDER, from the repository's top, needs 30 GB.
 #
-#     tools/train/train.sh net|blend|gradnet|kernels|sampling FOLDER [SCENES]
+#     tools/train/train.sh net|blend|gradnet|kernels FOLDER [SCENES]
 set -eu
 cd "$(dirname "$0")/../.."
 method=$1
@@ -60,11 +60,6 @@ gradnet)
 kernels)
 	"$python" tools/train/kernel_frames.py "$folder/scenes" "$folder/frames-kernels" --fluxion "$fluxion"
 	weights kernels kernels "$folder/frames-kernels"
-	;;
-sampling)
-	"$fluxion" dataset "$folder"/scenes/*/scene.xml -o "$folder/frames-sampling" --spp 8,16,32,64,128 --size 96x96 --reference 256 \
-		--target l2 --half --layers features,gradients --resume
-	weights sampling sampling "$folder/frames-sampling"
 	;;
 net | blend)
 	with_targets 02468 even 4,16,64

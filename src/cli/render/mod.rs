@@ -206,8 +206,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         Shifted::Always => method.needs().with_every_difference(),
         Shifted::Auto => method.needs(),
     };
-    let allocator = allocator(args, method.as_ref())?;
-    let needed = needed.union(kernel.needs()).union(allocator.map_or(Needs::default(), Allocator::needs));
+    let needed = needed.union(kernel.needs());
     let saved = saved(args, needed);
     let plan = match args.plan {
         Planned::Needed => Plan::new(&scene, needed, saved),
@@ -230,6 +229,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     };
     let sink = origin.zip(lock).and_then(|(origin, lock)| args.checkpoint.sink(origin, &start, lock));
     let viewer = viewer(args, &scene)?;
+    let allocator = allocator(args, method.as_ref())?;
     let (scene, method, sink, viewer) = (&scene, method.as_ref(), sink.as_ref(), viewer.as_ref());
     let done = Job { args, scene, method, allocator, kernel, goals, sink, viewer }.run(start, &mut stats);
     match sink {
