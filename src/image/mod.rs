@@ -9,9 +9,6 @@ pub mod planes;
 
 use crate::math::{Rgb, vec3};
 
-/// Least typical luminance: the square of one over it is still a float.
-const LEAST_LUMINANCE: f32 = 1e-18;
-
 /// `width * height` pixels of `channels` floats each.
 #[derive(Clone, Debug, PartialEq, Default)]
 pub struct Image {
@@ -77,19 +74,6 @@ impl Image {
     pub fn add(&mut self, other: &Self) {
         debug_assert_eq!((self.width, self.height, self.channels), (other.width, other.height, other.channels));
         self.data.iter_mut().zip(&other.data).for_each(|(sum, value)| *sum += value);
-    }
-
-    /// The geometric mean of the luminance of a colour image, in which dark pixels count as a thousandth of the mean. It is so large
-    /// that one over its square is finite, in images that are all but black, too; of black ones it is one.
-    pub fn typical_luminance(&self) -> f32 {
-        let luminance = |pixel: &[f32]| f64::from(pixel.iter().sum::<f32>() / 3.0).max(0.0);
-        let count = self.data.len() as f64 / 3.0;
-        let mean = self.data.chunks_exact(3).map(luminance).sum::<f64>() / count;
-        if mean <= 0.0 {
-            return 1.0;
-        }
-        let log = self.data.chunks_exact(3).map(|pixel| (luminance(pixel) + 1e-3 * mean).ln()).sum::<f64>() / count;
-        (log.exp() as f32).max(LEAST_LUMINANCE)
     }
 
     /// Column, row and channel of the first sample that is not finite.

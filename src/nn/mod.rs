@@ -7,14 +7,12 @@
 pub mod convolution;
 pub mod gradnet;
 pub mod resample;
-pub mod stack;
 pub mod tensor;
 pub mod unet;
 pub mod weights;
 
 pub use self::convolution::{Activation, Convolution};
 pub use self::gradnet::GradNet;
-pub use self::stack::Stack;
 pub use self::tensor::Tensor;
 pub use self::unet::UNet;
 pub use self::weights::Weights;

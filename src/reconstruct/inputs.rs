@@ -14,6 +14,9 @@ use crate::solve::graph::Quad;
 /// Least variance of a colour, as a share of the mean variance of the pixels around it.
 pub const FLOOR: f32 = 0.5;
 
+/// Least typical luminance: the square of one over it is still a float.
+const LEAST_LUMINANCE: f32 = 1e-18;
+
 /// Scattered radiance, as layers of a frame.
 pub struct Inputs<'a> {
     /// The frame.
@@ -31,7 +34,8 @@ pub struct Inputs<'a> {
 impl<'a> Inputs<'a> {
     /// The inputs of a frame, mirrored until both sides are multiples of `multiple`.
     pub fn new(frame: &'a Frame, multiple: usize) -> Result<Self> {
-        let scale = 1.0 / frame.require(Layer::Color)?.typical_luminance();
+        // In an image that is all but black the scale is still finite.
+        let scale = 1.0 / typical_luminance(frame.require(Layer::Color)?).max(LEAST_LUMINANCE);
         let samples = &frame.require(Layer::Samples)?.data;
         let spp = (samples.iter().map(|&n| f64::from(n)).sum::<f64>() / samples.len() as f64).max(1.0) as f32;
         let (width, height) = (frame.width.next_multiple_of(multiple), frame.height.next_multiple_of(multiple));
@@ -174,6 +178,18 @@ pub fn quads(planes: &Planes, first: usize) -> Vec<Quad> {
 /// which does not mean that the pixel is known.
 pub fn floor_variance(variance: &Planes, share: f32) -> Planes {
     variance.zip(&variance.box_mean(1), |variance, around| variance.max(share * around))
+}
+
+/// The geometric mean of the luminance, in which dark pixels count as a thousandth of the mean.
+fn typical_luminance(color: &Image) -> f32 {
+    let luminance = |pixel: &[f32]| f64::from(pixel.iter().sum::<f32>() / 3.0).max(0.0);
+    let count = color.data.len() as f64 / 3.0;
+    let mean = color.data.chunks_exact(3).map(luminance).sum::<f64>() / count;
+    if mean <= 0.0 {
+        return 1.0;
+    }
+    let log = color.data.chunks_exact(3).map(|pixel| (luminance(pixel) + 1e-3 * mean).ln()).sum::<f64>() / count;
+    log.exp() as f32
 }
 
 #[cfg(test)]
