@@ -2,7 +2,7 @@
 
 use std::sync::atomic::AtomicBool;
 
-use super::schedule::RenderOutcome;
+use super::outcome::RenderOutcome;
 use super::wave::Samples;
 use crate::math::Vec2;
 

@@ -15,6 +15,7 @@ mod emission;
 mod features;
 pub mod gradient;
 mod half_edges;
+mod outcome;
 mod paths;
 mod per_tile;
 mod record;
@@ -31,10 +32,9 @@ use serde::{Deserialize, Serialize};
 
 pub use self::control::{Control, FilmSink, SampleSink, WaveSamples};
 pub use self::gradient::{SHIFTS, Shift};
+pub use self::outcome::RenderOutcome;
 pub use self::sampler::Sampler;
-pub use self::schedule::{
-    Budget, RenderOutcome, RenderSettings, render, render_to_counts, resume, resume_to_counts, sample,
-};
+pub use self::schedule::{Budget, RenderSettings, render, render_to_counts, resume, resume_to_counts, sample};
 pub use self::shown::{ShownShapes, shown_shapes};
 pub use self::wave::Samples;
 

@@ -8,9 +8,8 @@ use rayon::prelude::*;
 
 use super::control::{Control, SampleSink, WaveSamples};
 use super::gradient::Shift;
-use super::per_tile::PerTile;
+use super::outcome::{Choices, RenderOutcome};
 use super::seen;
-use super::thinning::Shares;
 use super::wave::Wave;
 use super::{SampleId, Sampler};
 use crate::film::{EdgeNeed, Film, Kernel, Needs, Rejected, Sample, TILE, Tile};
@@ -49,45 +48,6 @@ impl RenderSettings {
     /// Seed 0, the default shift and the cross.
     pub fn new(budget: Budget, needs: Needs) -> Self {
         Self { budget, seed: 0, first: 0, needs, shift: Shift::default(), kernel: Selector::default() }
-    }
-}
-
-/// A rendered film with its statistics.
-pub struct RenderOutcome {
-    /// The film.
-    pub film: Film,
-    /// Samples of the pixel that has the fewest.
-    pub spp: u32,
-    /// Wall-clock time, including that before a resumption.
-    pub elapsed: Duration,
-    /// Whether the caller stopped it early.
-    pub stopped: bool,
-    /// The first sample that was not finite, for `--replay`.
-    pub first_rejected: Option<(SampleId, Rejected)>,
-    /// Findings about the tiles; made again when a film is read from a file.
-    pub(crate) choices: Choices,
-}
-
-/// Findings about every tile, made when they are first needed and kept for the whole render.
-pub(crate) struct Choices {
-    /// Result of [`seen::grids`].
-    grids: PerTile<Vec<u32>>,
-    shares: Shares,
-    /// Encoder of the pilot's samples while neighbours are pending, for kernels that ask for one.
-    encoder: Option<Encoder>,
-}
-
-impl RenderOutcome {
-    /// An empty film.
-    pub fn new(scene: &Scene, needs: Needs) -> Self {
-        Self::of(Film::new(scene.sensor().width, scene.sensor().height, needs))
-    }
-
-    /// A film with its samples, as if no time had been spent on it.
-    pub(crate) fn of(film: Film) -> Self {
-        let choices = Choices { grids: PerTile::new(film.tiles()), shares: Shares::new(film.tiles()), encoder: None };
-        let spp = film.fewest_samples();
-        Self { film, spp, elapsed: Duration::ZERO, stopped: false, first_rejected: None, choices }
     }
 }
 
