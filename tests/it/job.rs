@@ -285,6 +285,8 @@ fn plans_that_cannot_be_carried_out_are_refused() {
         (&["--spp", "16", "--", "--method", "l2", "--kernel", "structure"], "pilots of their own"),
         (&["--spp", "16", "--chunks", "0"], "--chunks"),
         (&["--spp", "64", "--adaptive"], "two rounds take --chunks 2"),
+        (&["--spp", "64", "--", "--adaptive"], "give --adaptive before the --"),
+        (&["--spp", "64", "--", "--target-error", "0.01"], "neither --target-error nor --goals"),
         (&["--spp", "64", "--chunks", "4", "--adaptive", "--", "--method", "l1"], "does not estimate its error"),
     ] {
         expect(at, &[&["job", "plan", &cornell, "-o", "j"], extra].concat(), 2, expected);

@@ -137,7 +137,7 @@ impl Job {
         for image in 0..job.images() {
             let Some(chunk) = job.chunk(job.first_round(image).start)? else { continue };
             let render = job.render(&chunk, Path::new("chunk.ckpt"))?;
-            render.check_merging()?;
+            render.check_chunk()?;
             if let Some(first) = &job.adaptive {
                 render.check_allocator(first.allocator()?)?;
             }

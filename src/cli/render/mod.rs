@@ -144,8 +144,12 @@ impl Args {
         Ok(adaptive::check(method.as_ref(), allocator.needs_error())?)
     }
 
-    /// Fails if films that are rendered so with different samples cannot be merged.
-    pub fn check_merging(&self) -> Result<()> {
+    /// Fails if these are no options of a chunk, whose film is merged with others and has the samples that its plan says.
+    pub fn check_chunk(&self) -> Result<()> {
+        if self.adaptive.is_some() || self.target_error.is_some() || self.goals.is_some() {
+            let what = "chunks cannot say how many samples they take: give --adaptive before the --, and neither --target-error nor --goals";
+            bail!(Error::Usage(what.into()));
+        }
         self.kernel.check_merging()
     }
 }
