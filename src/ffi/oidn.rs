@@ -38,6 +38,7 @@ struct Functions {
     new_filter: unsafe extern "C" fn(Handle, *const c_char) -> Handle,
     set_filter_image: unsafe extern "C" fn(Handle, *const c_char, Handle, c_int, usize, usize, usize, usize, usize),
     set_filter_bool: unsafe extern "C" fn(Handle, *const c_char, bool),
+    set_filter_int: unsafe extern "C" fn(Handle, *const c_char, c_int),
     commit_filter: unsafe extern "C" fn(Handle),
     execute_filter: unsafe extern "C" fn(Handle),
     release_filter: unsafe extern "C" fn(Handle),
@@ -108,6 +109,7 @@ impl Functions {
             new_filter: function!(b"oidnNewFilter\0"),
             set_filter_image: function!(b"oidnSetSharedFilterImage\0"),
             set_filter_bool: function!(b"oidnSetFilterBool\0"),
+            set_filter_int: function!(b"oidnSetFilterInt\0"),
             commit_filter: function!(b"oidnCommitFilter\0"),
             execute_filter: function!(b"oidnExecuteFilter\0"),
             release_filter: function!(b"oidnReleaseFilter\0"),
@@ -133,11 +135,14 @@ impl Functions {
 pub struct Device {
     handle: Handle,
     functions: &'static Functions,
+    /// Megabytes that filters may use, if they are not free to choose; images are then filtered tile by tile.
+    memory: Option<c_int>,
 }
 
 impl Device {
-    /// Starts Open Image Denoise (0 threads: one per core). The error is its own message, or says how to get it.
-    pub fn new(threads: usize) -> Result<Self, String> {
+    /// Starts Open Image Denoise (0 threads: one per core), with about so many bytes of memory for filters. The error is its own
+    /// message, or says how to get it.
+    pub fn new(threads: usize, memory: Option<u64>) -> Result<Self, String> {
         let functions = functions()?;
         // SAFETY: creating a device has no preconditions; null is checked for.
         let handle = unsafe { (functions.new_device)(DEVICE_TYPE_CPU) };
@@ -145,7 +150,8 @@ impl Device {
             functions.check(handle)?;
             return Err("no device: the library's device modules must lie beside it".into());
         }
-        let device = Self { handle, functions };
+        let memory = memory.map(|bytes| c_int::try_from(bytes >> 20).unwrap_or(c_int::MAX).max(1));
+        let device = Self { handle, functions, memory };
         // SAFETY: the device is valid and the names are null-terminated.
         unsafe {
             (functions.set_device_int)(handle, c"numThreads".as_ptr(), threads as c_int);
@@ -188,6 +194,7 @@ impl Device {
         // SAFETY: the filter is valid, all its images are set, and it is not used after its release.
         unsafe {
             options.iter().for_each(|option| (functions.set_filter_bool)(filter, option.as_ptr(), true));
+            self.memory.iter().for_each(|&most| (functions.set_filter_int)(filter, c"maxMemoryMB".as_ptr(), most));
             (functions.commit_filter)(filter);
             (functions.execute_filter)(filter);
             (functions.release_filter)(filter);

@@ -9,12 +9,12 @@ pub fn check() -> Result<()> {
     oidn::check().map_err(|what| Error::backend("open image denoise", what))
 }
 
-/// Denoises linear radiance with the help of albedo and normal. `clean` filters these first, which Open Image Denoise
-/// calls accurate prefiltering.
-pub fn denoise(color: &Image, albedo: &Image, normal: &Image, clean: bool) -> Result<Image> {
+/// Denoises linear radiance with the help of albedo and normal, in about so many bytes of `memory`, which changes no bit. `clean` filters
+/// features first, which Open Image Denoise calls accurate prefiltering.
+pub fn denoise(color: &Image, [albedo, normal]: [&Image; 2], clean: bool, memory: Option<u64>) -> Result<Image> {
     let size = (color.width, color.height);
     let run = || {
-        let device = Device::new(rayon::current_num_threads())?;
+        let device = Device::new(rayon::current_num_threads(), memory)?;
         let color = (c"color", color.data.as_slice());
         let data = if clean {
             let albedo = device.filter(size, &[(c"albedo", &albedo.data)], &[])?;

@@ -42,19 +42,19 @@ impl Reconstruction for Oidn {
         Needs { features: true, ..Needs::default() }
     }
 
-    fn reconstruct(&self, frame: &Frame, _context: &Context) -> Result<Solution> {
-        let image = clean(frame, self.accurate, frame.get(Layer::Direct).filter(|_| self.direct))?;
+    fn reconstruct(&self, frame: &Frame, context: &Context) -> Result<Solution> {
+        let image = clean(frame, self.accurate, frame.get(Layer::Direct).filter(|_| self.direct), context.memory)?;
         Ok(Solution { image, alpha: None, error: None, notes: Vec::new() })
     }
 }
 
 /// A frame's scattered light, denoised: together with the light of directly seen emitters, if that is given, which is
-/// subtracted again, since it is added to every method's image.
-pub fn clean(frame: &Frame, accurate: bool, direct: Option<&Image>) -> Result<Image> {
+/// subtracted again, since it is added to every method's image. The library takes about so many bytes of `memory`.
+pub fn clean(frame: &Frame, accurate: bool, direct: Option<&Image>, memory: Option<u64>) -> Result<Image> {
     let (albedo, normal) = (frame.require(Layer::Albedo)?, frame.require(Layer::Normal)?);
     let mut color = frame.require(Layer::Color)?.clone();
     direct.iter().for_each(|direct| color.add(direct));
-    let mut image = denoise(&color, albedo, normal, accurate)?;
+    let mut image = denoise(&color, [albedo, normal], accurate, memory)?;
     direct.iter().for_each(|direct| {
         image.data.iter_mut().zip(&direct.data).for_each(|(value, direct)| *value -= direct);
     });

@@ -59,7 +59,7 @@ pub fn denoise(
             let options = rdfc::Options { window, symmetric: form == Form::Code, choice, rows };
             Ok(rdfc::denoise(&guides, options, &|share| (context.progress)("denoise", share)))
         }
-        Denoiser::Oidn => clean(frame, true, frame.get(Layer::Direct)).map(judged),
+        Denoiser::Oidn => clean(frame, true, frame.get(Layer::Direct), context.memory).map(judged),
         Denoiser::Net => parse("net:image=safe")?.reconstruct(frame, context).map(|solution| judged(solution.image)),
     }
 }
