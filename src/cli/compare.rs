@@ -34,7 +34,7 @@ pub struct Args {
 }
 
 /// The figure of images with alpha, with its description. Colours are compared multiplied by theirs.
-const ALPHA: (&str, &str) = ("alpha", "mean of |I - R| of the alpha channels");
+pub const ALPHA: (&str, &str) = ("alpha", "mean of |I - R| of the alpha channels");
 
 /// Measures with every metric.
 pub fn run(args: &Args) -> Result<ExitCode> {

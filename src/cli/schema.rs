@@ -10,6 +10,7 @@ use fluxion::report::stress::Row;
 use fluxion::samples::Description;
 use schemars::{Schema, json_schema, schema_for};
 
+use super::compare::ALPHA;
 use super::job::{Job, Status};
 use super::progress::Line;
 use super::stats::Stats;
@@ -61,7 +62,7 @@ fn of_compare() -> Schema {
     let mut properties: serde_json::Map<_, _> =
         METRICS.iter().map(|metric| (metric.id.to_owned(), figure(metric.summary))).collect();
     let required: Vec<_> = METRICS.iter().map(|metric| metric.id).collect();
-    properties.insert("alpha".into(), figure("mean of |I - R| of the alpha channels, of images that have them"));
+    properties.insert(ALPHA.0.into(), figure(ALPHA.1));
     properties.insert("image".into(), serde_json::json!({"type": "string", "description": "the file, of several"}));
     json_schema!({"title": "Figures", "type": "object", "properties": properties, "required": required})
 }

@@ -10,12 +10,11 @@ use clap_complete::Shell;
 use super::Args;
 use super::terminal::out;
 
-const NAME: &str = "fluxion";
-
 /// Prints a shell's script.
 pub fn completions(shell: Shell) -> Result<ExitCode> {
-    let mut script = Vec::new();
-    clap_complete::generate(shell, &mut Args::command(), NAME, &mut script);
+    let (mut command, mut script) = (Args::command(), Vec::new());
+    let name = command.get_name().to_owned();
+    clap_complete::generate(shell, &mut command, name, &mut script);
     out!("{}", String::from_utf8_lossy(&script).trim_end())?;
     Ok(ExitCode::SUCCESS)
 }

@@ -31,6 +31,15 @@ fn developed(path: &Path) -> Frame {
     checkpoint::load(path).unwrap().develop()
 }
 
+/// Every layer is the same, up to rounding.
+fn assert_close(merged: &Frame, whole: &Frame, name: &str) {
+    for (layer, image) in whole.present() {
+        let most = image.data.iter().fold(0.0f32, |most, value| most.max(value.abs()));
+        let close = |(a, b): (&f32, &f32)| (a - b).abs() <= 1e-5 * most;
+        assert!(merged.get(layer).unwrap().data.iter().zip(&image.data).all(close), "{name}: {}", layer.name());
+    }
+}
+
 #[test]
 fn chunks_make_the_image_of_one_render() {
     let folder = tempfile::tempdir().unwrap();
@@ -65,12 +74,7 @@ fn chunks_make_the_image_of_one_render() {
     for (name, scene) in [("cornell-box", &cornell), ("glossy-metal", &metal)] {
         let all = ["render", scene, "--spp", "44", "--checkpoint", "all.ckpt"];
         expect(at, &[&all[..], &options[..]].concat(), 0, "");
-        let (merged, whole) = (developed(&at.join(format!("j/{name}.ckpt"))), developed(&at.join("all.ckpt")));
-        for (layer, image) in whole.present() {
-            let most = image.data.iter().fold(0.0f32, |most, value| most.max(value.abs()));
-            let close = |(a, b): (&f32, &f32)| (a - b).abs() <= 1e-5 * most;
-            assert!(merged.get(layer).unwrap().data.iter().zip(&image.data).all(close), "{name}: {}", layer.name());
-        }
+        assert_close(&developed(&at.join(format!("j/{name}.ckpt"))), &developed(&at.join("all.ckpt")), name);
         assert!(at.join(format!("j/{name}.exr")).exists());
         fs::remove_file(at.join("all.ckpt")).unwrap();
     }
@@ -170,12 +174,8 @@ fn adaptive_jobs_allocate_the_samples_of_a_second_round() {
     let goals = "j/cornell-box.goals.exr";
     let all = ["render", &cornell, "--goals", goals, "--spp", "9999", "--checkpoint", "all.ckpt"];
     expect(at, &[&all[..], &options[..]].concat(), 0, "");
-    let (merged, whole) = (developed(&at.join("j/cornell-box.ckpt")), developed(&at.join("all.ckpt")));
-    for (layer, image) in whole.present() {
-        let most = image.data.iter().fold(0.0f32, |most, value| most.max(value.abs()));
-        let close = |(a, b): (&f32, &f32)| (a - b).abs() <= 1e-5 * most;
-        assert!(merged.get(layer).unwrap().data.iter().zip(&image.data).all(close), "{}", layer.name());
-    }
+    let merged = developed(&at.join("j/cornell-box.ckpt"));
+    assert_close(&merged, &developed(&at.join("all.ckpt")), "cornell-box");
     let counts = &merged.get(Layer::Samples).unwrap().data;
     assert!(counts.iter().any(|&count| count > 120.0) && counts.iter().all(|&count| count >= 24.0 + 35.0));
     // An image's counts will do, and those of another size will not.

@@ -111,9 +111,9 @@ impl Job {
         line.push("--resume".to_owned());
         line.extend(frame.into_iter().flat_map(|frame| option("-D", format!("frame={frame}"))));
         line.extend(self.contents.get(image).into_iter().flat_map(|known| option("--content", known.clone())));
-        line.extend(
-            allocated.then(|| option("--goals", self.goals(image).display().to_string())).into_iter().flatten(),
-        );
+        if allocated {
+            line.extend(option("--goals", self.goals(image).display().to_string()));
+        }
         line.extend(self.options.iter().cloned());
         match Args::try_parse_from(line) {
             Ok(Args { command: Command::Render(args), .. }) => Ok(args),

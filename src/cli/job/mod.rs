@@ -16,14 +16,14 @@ mod run;
 mod schedulers;
 mod status;
 
-pub use self::description::Job;
-pub use self::status::Status;
-
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::Result;
 use clap::Subcommand;
+
+pub use self::description::Job;
+pub use self::status::Status;
 
 /// Options of `job`.
 #[derive(clap::Args)]
