@@ -16,9 +16,11 @@ fn main() {
         println!("cargo::rerun-if-env-changed={variable}");
     }
     build_embree();
-    build_openimageio();
     bind("ffi/embree.h", "embree.rs");
-    bind("ffi/oiio.h", "oiio.rs");
+    if env::var_os("CARGO_FEATURE_OPENIMAGEIO").is_some() {
+        build_openimageio();
+        bind("ffi/oiio.h", "oiio.rs");
+    }
 }
 
 fn fail(reason: &str) -> ! {

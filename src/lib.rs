@@ -30,6 +30,7 @@ pub mod error;
 pub mod files;
 pub mod math;
 pub mod mattes;
+pub mod pixels;
 
 pub mod ffi;
 pub mod image;

@@ -5,7 +5,7 @@ use std::path::Path;
 use crate::error::{Error, Result};
 use crate::film::{Film, Layer, Needs, Provenance};
 use crate::image::Image;
-use crate::image::io::{ImageFile, Kind, Pixels, read, write};
+use crate::image::io::{ImageFile, Kind, OpenImage, Pixels, read, write};
 use crate::math::rng;
 use crate::render::{Budget, Control, RenderSettings, render};
 use crate::scene::Scene;

@@ -14,6 +14,15 @@ pub struct Limits {
     pub error: Option<f64>,
 }
 
+impl Limits {
+    /// These limits or, without any, the number of samples that the scene asks for.
+    #[must_use]
+    pub fn or_samples(self, spp: u32) -> Self {
+        let spp = self.spp.or((self.time.is_none() && self.error.is_none()).then_some(spp));
+        Self { spp, ..self }
+    }
+}
+
 /// Samples of every pixel before the first decision: one in each bin. With fewer, variances of pixels are too noisy to
 /// allocate by.
 pub(super) const FIRST_SPP: u32 = 8;

@@ -58,6 +58,16 @@ pub fn allocator(id: &str) -> Result<&'static dyn Allocator> {
     })
 }
 
+/// The allocator of a name, or without one the default where there is time or an error to decide by and the method allows it.
+pub fn chosen(
+    id: Option<&str>,
+    limits: &Limits,
+    method: &dyn Reconstruction,
+) -> Result<Option<&'static dyn Allocator>> {
+    let by_default = (limits.time.is_some() && method.estimates_error()) || limits.error.is_some();
+    id.or_else(|| by_default.then(|| ALLOCATORS[0].id())).map(allocator).transpose()
+}
+
 /// Fails if a method does not estimate the errors that decisions are made by.
 pub fn check(method: &dyn Reconstruction, by_error: bool) -> Result<()> {
     if !by_error || method.estimates_error() {

@@ -3,7 +3,8 @@
 use anyhow::Result;
 use fluxion::error::Error;
 use fluxion::neighbours::Selector;
-use fluxion::reconstruct::{self, METHODS, Method, Reconstruction};
+use fluxion::plan;
+use fluxion::reconstruct::Reconstruction;
 
 use super::terminal::note;
 
@@ -33,27 +34,11 @@ impl Args {
 
     /// The neighbours for a method and for films of so many samples, if that is known. The error says which methods take them.
     pub fn make(&self, method: &dyn Reconstruction, spp: Option<u32>) -> Result<Selector> {
-        let selector = Selector::parse(&self.kernel, self.pilot)?;
-        if selector.is_cross() {
-            return Ok(selector);
-        }
-        if method.needs_cross() {
-            let takes = |method: &&Method| {
-                reconstruct::parse(method.id).is_ok_and(|made| made.needs().edges.is_sampled() && !made.needs_cross())
-            };
-            let names: Vec<_> = METHODS.iter().filter(takes).map(|method| method.id).collect();
-            let what = "this method takes differences to the four direct neighbours only; with other kernels take";
-            return Err(Error::Usage(format!("{what} --method {}", names.join(", "))).into());
-        }
-        if !method.needs().edges.is_sampled() {
+        let wanted = Selector::parse(&self.kernel, self.pilot)?;
+        let chosen = plan::kernel(wanted, method, spp)?;
+        if chosen.is_cross() && !wanted.is_cross() {
             note!("warning: this method takes no differences: --kernel changes nothing");
-            return Ok(Selector::default());
         }
-        let pilot = selector.pilot();
-        if let Some(spp) = spp.filter(|&spp| spp < pilot || spp <= selector.without_differences()) {
-            let what = format!("a pilot of {pilot} samples is too long for {spp}: give a smaller --pilot");
-            return Err(Error::Usage(what).into());
-        }
-        Ok(selector)
+        Ok(chosen)
     }
 }

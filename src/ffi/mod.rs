@@ -1,9 +1,9 @@
 //! Safe wrappers around the C libraries: the only unsafe code of the crate.
 
 pub mod embree;
-mod exr_header;
 pub mod memory;
 pub mod oidn;
+#[cfg(feature = "openimageio")]
 pub mod oiio;
 
 /// The declarations that bindgen makes from the headers under `ffi/`.
@@ -20,6 +20,7 @@ mod raw {
     pub mod embree {
         include!(concat!(env!("OUT_DIR"), "/embree.rs"));
     }
+    #[cfg(feature = "openimageio")]
     pub mod oiio {
         include!(concat!(env!("OUT_DIR"), "/oiio.rs"));
     }

@@ -2,113 +2,42 @@
 #![allow(unsafe_code)]
 
 use std::ffi::{CStr, CString, c_char, c_void};
+use std::ops::Deref;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
-use super::exr_header;
 use super::raw::oiio as raw;
 use crate::error::{Error, Result};
+use crate::pixels::{DataWindow, Header, Kind, OpenImage, Pixels, Storage, exr_header};
 
-/// How samples are stored in a file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
-    /// 32-bit float.
-    Float,
-    /// 16-bit float.
-    Half,
-    /// Eight bits, already display-encoded.
-    Uint8,
-}
-
-impl Kind {
-    fn name(self) -> &'static CStr {
-        match self {
-            Self::Float => c"float",
-            Self::Half => c"half",
-            Self::Uint8 => c"uint8",
-        }
+/// OpenImageIO's name of a kind of samples.
+fn name(kind: Kind) -> &'static CStr {
+    match kind {
+        Kind::Float => c"float",
+        Kind::Half => c"half",
+        Kind::Uint8 => c"uint8",
     }
 }
 
-/// How the samples of a channel are stored.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Storage {
-    /// Floats of any size.
-    Float,
-    /// Integers of so many bits, read as shares of the largest.
-    Unsigned(u32),
-    /// Signed integers and other types that pictures rarely have.
-    Other,
-}
-
-/// Position of an image in a larger picture, of which it is a part.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct DataWindow {
-    /// Column and row of its first pixel.
-    pub origin: (usize, usize),
-    /// Width and height of the whole picture.
-    pub full: (usize, usize),
-}
-
-/// Pixels as files hold them: rows from the top, channels interleaved in the order of `channels`.
-#[derive(Clone, Debug, Default)]
-pub struct Pixels {
-    /// Pixels in a row.
-    pub width: usize,
-    /// Number of rows.
-    pub height: usize,
-    /// Channel names. Readers must go by name: EXR files sort their channels.
-    pub channels: Vec<String>,
-    /// `width * height * channels.len()` samples.
-    pub data: Vec<f32>,
-    /// The larger picture that the pixels are a part of, if they are. Only exr files keep it.
-    pub window: Option<DataWindow>,
-    /// Named strings of the file's header that were asked for, or that are to be written.
-    pub attributes: Vec<(String, String)>,
-}
-
-/// More samples than this in one file are taken for a damaged or hostile header.
-const MAX_SAMPLES: usize = 1 << 32;
-/// More samples than this for every byte of the file are taken for a damaged header, too: no compression packs real
-/// pictures like that.
-const MAX_SAMPLES_PER_BYTE: usize = 1 << 11;
-
-/// Rows that some of OpenEXR's compressions work on at once, and the samples in them that are no reason for doubt.
-const ROWS_AT_ONCE: usize = 256;
-const ROOM: usize = 1 << 27;
-
 /// An image file whose header has been read.
 pub struct ImageFile<'a> {
-    /// Pixels in a row.
-    pub width: usize,
-    /// Number of rows.
-    pub height: usize,
-    /// Index of the first pixel in the file.
-    pub origin: (i32, i32),
-    /// Channel names, in the order of the file.
-    pub channels: Vec<String>,
-    /// How each channel is stored.
-    pub storage: Vec<Storage>,
-    /// The larger picture that it is a part of, if it is.
-    pub window: Option<DataWindow>,
-    /// OpenImageIO's name of the format, as in `openexr`.
-    pub format: String,
+    header: Header,
     path: &'a Path,
     handle: *mut c_void,
+}
+
+impl Deref for ImageFile<'_> {
+    type Target = Header;
+
+    fn deref(&self) -> &Header {
+        &self.header
+    }
 }
 
 impl Drop for ImageFile<'_> {
     fn drop(&mut self) {
         // SAFETY: the handle came from fluxion_image_open and is closed once.
         unsafe { raw::fluxion_image_close(self.handle) }
-    }
-}
-
-fn check_header(path: &Path) -> Result<()> {
-    match exr_header::validate(path) {
-        Ok(None) => Ok(()),
-        Ok(Some(what)) => Err(Error::io(path, what)),
-        Err(error) => Err(Error::io(path, error)),
     }
 }
 
@@ -132,7 +61,7 @@ impl<'a> ImageFile<'a> {
     /// Reads the header.
     pub fn open(path: &'a Path) -> Result<Self> {
         let bytes = std::fs::metadata(path).map_err(|error| Error::io(path, error))?.len() as usize;
-        check_header(path)?;
+        exr_header::check(path)?;
         let name = path_string(path)?;
         let mut spec = raw::FluxionImageSpec::default();
         let mut error = raw::FluxionError::default();
@@ -150,24 +79,14 @@ impl<'a> ImageFile<'a> {
         };
         // SAFETY: the array ends in a zero, since the other side copies at most all but one of its bytes.
         let format = unsafe { owned(spec.format.as_ptr()) }.unwrap_or_default();
-        let (origin, channels, storage) = ((spec.x, spec.y), Vec::new(), Vec::new());
-        let mut file = Self { width, height, origin, channels, storage, window, format, path, handle };
-        file.channels = (0..spec.channels)
+        let header = Header { width, height, origin: (spec.x, spec.y), window, format, ..Header::default() };
+        let mut file = Self { header, path, handle };
+        file.header.channels = (0..spec.channels)
             // SAFETY: the handle is open; the string lives as long.
             .map(|index| unsafe { owned(raw::fluxion_image_channel(handle, index)) }.unwrap_or_default())
             .collect();
-        file.storage = (0..spec.channels).map(|index| file.storage_of(index)).collect();
-        let samples = file.samples();
-        if samples == 0 || samples > MAX_SAMPLES.min(bytes.saturating_mul(MAX_SAMPLES_PER_BYTE)) {
-            let what = format!("the header claims {width}x{height} pixels of {} channels", spec.channels);
-            return Err(Error::io(path, what));
-        }
-        // OpenEXR makes room for many rows, however few there are.
-        let room = ROWS_AT_ONCE.saturating_mul(samples / height);
-        if file.format == "openexr" && room > ROOM.max(4 * samples) {
-            let what = format!("the header claims rows of {width} pixels, but {height} of them");
-            return Err(Error::io(path, what));
-        }
+        file.header.storage = (0..spec.channels).map(|index| file.storage_of(index)).collect();
+        file.check(path, bytes)?;
         Ok(file)
     }
 
@@ -182,27 +101,16 @@ impl<'a> ImageFile<'a> {
             Type::FLUXION_OTHER => Storage::Other,
         }
     }
+}
 
-    /// Whether every sample is stored in eight bits.
-    pub fn is_eight_bit(&self) -> bool {
-        self.storage.iter().all(|storage| *storage == Storage::Unsigned(8))
-    }
-
-    /// Samples of all pixels.
-    fn samples(&self) -> usize {
-        let pixels = self.width.checked_mul(self.height);
-        pixels.and_then(|pixels| pixels.checked_mul(self.channels.len())).unwrap_or(usize::MAX)
-    }
-
-    /// A named string of the header.
-    pub fn attribute(&self, name: &str) -> Option<String> {
+impl OpenImage for ImageFile<'_> {
+    fn attribute(&self, name: &str) -> Option<String> {
         let name = CString::new(name).ok()?;
         // SAFETY: the handle is open; the string is copied before the next call.
         unsafe { owned(raw::fluxion_image_attribute(self.handle, name.as_ptr())) }
     }
 
-    /// All samples as floats, channels interleaved.
-    pub fn floats(&self) -> Result<Vec<f32>> {
+    fn floats(&self) -> Result<Vec<f32>> {
         let mut data = vec![0.0; self.samples()];
         let mut error = raw::FluxionError::default();
         // SAFETY: `data` has room for width * height * channels floats.
@@ -210,22 +118,13 @@ impl<'a> ImageFile<'a> {
         if read { Ok(data) } else { Err(Error::io(self.path, message(&error))) }
     }
 
-    /// All samples in eight bits, channels interleaved.
-    pub fn bytes(&self) -> Result<Vec<u8>> {
+    fn bytes(&self) -> Result<Vec<u8>> {
         let mut data = vec![0; self.samples()];
         let mut error = raw::FluxionError::default();
         // SAFETY: `data` has room for width * height * channels bytes.
         let read = unsafe { raw::fluxion_image_read_bytes(self.handle, data.as_mut_ptr(), &mut error) };
         if read { Ok(data) } else { Err(Error::io(self.path, message(&error))) }
     }
-}
-
-/// Reads a whole image, and those of `attributes` that its header has.
-pub fn read(path: &Path, attributes: &[&str]) -> Result<Pixels> {
-    let file = ImageFile::open(path)?;
-    let attributes = attributes.iter().filter_map(|&name| Some((name.to_owned(), file.attribute(name)?))).collect();
-    let (width, height, channels, window) = (file.width, file.height, file.channels.clone(), file.window);
-    Ok(Pixels { width, height, channels, data: file.floats()?, window, attributes })
 }
 
 /// A cache of image files that are too large to be held at once.
@@ -275,7 +174,7 @@ impl TextureSystem {
 impl CachedTexture {
     /// Opens a file.
     pub fn open(system: &Arc<TextureSystem>, path: &Path) -> Result<Self> {
-        check_header(path)?;
+        exr_header::check(path)?;
         let name = path_string(path)?;
         let mut error = raw::FluxionError::default();
         // SAFETY: all pointers are valid for the call.
@@ -303,7 +202,7 @@ impl CachedTexture {
 pub fn write(path: &Path, pixels: &Pixels, kind: Kind, compression: Option<&str>) -> Result<()> {
     assert_eq!(pixels.data.len(), pixels.width * pixels.height * pixels.channels.len(), "samples and sizes differ");
     let c_string = |text: &str| CString::new(text).map_err(|_| Error::io(path, "a name holds a NUL byte"));
-    let name = path_string(path)?;
+    let file_name = path_string(path)?;
     let size = |n: usize| i32::try_from(n).map_err(|_| Error::io(path, "the image is too large for any format"));
     let DataWindow { origin, full } = pixels.window.unwrap_or_default();
     let spec = raw::FluxionImageSpec {
@@ -327,11 +226,11 @@ pub fn write(path: &Path, pixels: &Pixels, kind: Kind, compression: Option<&str>
     // SAFETY: every pointer outlives the call, and the sizes are those of the buffers behind them.
     let written = unsafe {
         raw::fluxion_image_write(
-            name.as_ptr(),
+            file_name.as_ptr(),
             &spec,
             channels.as_ptr(),
             pixels.data.as_ptr(),
-            kind.name().as_ptr(),
+            name(kind).as_ptr(),
             compression.as_ref().map_or(std::ptr::null(), |text| text.as_ptr()),
             attributes.as_ptr(),
             attributes.len(),
@@ -339,53 +238,4 @@ pub fn write(path: &Path, pixels: &Pixels, kind: Kind, compression: Option<&str>
         )
     };
     if written { Ok(()) } else { Err(Error::io(path, message(&error))) }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn exr_keeps_every_bit_name_and_attribute() {
-        let file = tempfile::Builder::new().suffix(".exr").tempfile().unwrap();
-        let channels = ["R", "G", "B", "depth.Z"].map(String::from).to_vec();
-        let data: Vec<f32> = (0..3 * 2 * 4).map(|i| (i as f32).exp() * 1e-3).collect();
-        let attributes = vec![("fluxion:seed".to_owned(), "7".to_owned())];
-        let window = DataWindow { origin: (5, 6), full: (10, 9) };
-        let pixels = Pixels { width: 3, height: 2, channels, data, attributes, window: Some(window) };
-        write(file.path(), &pixels, Kind::Float, Some("zips")).unwrap();
-        let back = read(file.path(), &["fluxion:seed", "absent"]).unwrap();
-        assert_eq!(back.attributes, pixels.attributes);
-        assert_eq!(back.window, Some(window));
-        for (index, name) in pixels.channels.iter().enumerate() {
-            let at = back.channels.iter().position(|other| other == name).unwrap();
-            for pixel in 0..6 {
-                assert_eq!(back.data[pixel * 4 + at].to_bits(), pixels.data[pixel * 4 + index].to_bits());
-            }
-        }
-    }
-
-    #[test]
-    fn alpha_does_not_darken_colours() {
-        let file = tempfile::Builder::new().suffix(".png").tempfile().unwrap();
-        let channels = ["R", "G", "B", "A"].map(String::from).to_vec();
-        let data = vec![1.0, 0.4, 0.2, 0.0];
-        let pixels = Pixels { width: 1, height: 1, channels, data, window: None, attributes: vec![] };
-        write(file.path(), &pixels, Kind::Uint8, None).unwrap();
-        let back = read(file.path(), &[]).unwrap();
-        back.data.iter().zip(&pixels.data).for_each(|(a, b)| assert!((a - b).abs() < 1e-3, "{a} {b}"));
-    }
-
-    #[test]
-    fn missing_truncated_and_unwritable_files_are_errors_with_the_name() {
-        let missing = read(Path::new("/no/such.exr"), &[]).unwrap_err().to_string();
-        assert!(missing.starts_with("/no/such.exr: "), "{missing}");
-        let file = tempfile::Builder::new().suffix(".exr").tempfile().unwrap();
-        std::fs::write(file.path(), b"v/1\x01nothing more").unwrap();
-        let truncated = read(file.path(), &[]).unwrap_err().to_string();
-        assert!(truncated.len() > file.path().display().to_string().len() + 5, "{truncated}");
-        let pixels = Pixels { width: 1, height: 1, channels: vec!["R".into()], data: vec![1.0], ..Default::default() };
-        assert!(write(Path::new("/no/such/folder/a.exr"), &pixels, Kind::Float, None).is_err());
-        assert!(write(Path::new("a.nosuchformat"), &pixels, Kind::Float, None).is_err());
-    }
 }

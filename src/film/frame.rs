@@ -5,10 +5,10 @@ use std::borrow::Cow;
 use rayon::prelude::*;
 
 use super::layer::Layer;
-use super::{BINS, Cross, EdgeParts, Edges, Provenance, bin_count};
+use super::{BINS, Cross, EdgeParts, Edges, Provenance, aovs, bin_count};
 use crate::error::{Error, Result};
 use crate::image::Image;
-use crate::image::io::DataWindow;
+use crate::image::io::{DataWindow, Pixels};
 use crate::math::{Rgb, vec3};
 
 /// Means and variances of a film, as layers. A frame developed in memory and one read from a file are the same.
@@ -32,6 +32,45 @@ impl Frame {
     pub fn new(width: usize, height: usize) -> Self {
         let layers = vec![None; Layer::COUNT];
         Self { width, height, layers, edges: None, provenance: Provenance::default(), window: None }
+    }
+
+    /// A frame of several renders of one picture with different seeds, of `spp` samples a pixel each: their mean and its
+    /// variance, and bins of as many of them as there are powers of two, eight at most.
+    pub fn of_renders(renders: &[Image], spp: u32) -> Result<Self> {
+        let [first, _, ..] = renders else {
+            return Err(Error::Usage(format!("{} renders tell no variance: give two or more", renders.len())));
+        };
+        let fits = |render: &Image| render.shape() == first.shape();
+        if first.is_empty() || first.channels != 3 || !renders.iter().all(fits) || spp == 0 {
+            return Err(Error::Mismatch("the renders are of different sizes, or of no pixel, colour or sample".into()));
+        }
+        let mut frame = Self::new(first.width, first.height);
+        let mean = |of: &[&Image]| {
+            let value = |i: usize| of.iter().map(|image| f64::from(image.data[i])).sum::<f64>() / of.len() as f64;
+            Image { data: (0..first.data.len()).map(|i| value(i) as f32).collect(), ..first.clone() }
+        };
+        let (color, count) = (mean(&renders.iter().collect::<Vec<_>>()), renders.len() as f64);
+        let variance = |i: usize| {
+            let squares = renders.iter().map(|render| f64::from(render.data[i] - color.data[i]).powi(2)).sum::<f64>();
+            (squares / (count - 1.0) / count) as f32
+        };
+        let variance = Image { data: (0..first.data.len()).map(variance).collect(), ..first.clone() };
+        let groups = BINS.min(1 << renders.len().ilog2());
+        for k in 0..BINS {
+            let group: Vec<_> = renders.iter().skip(k % groups).step_by(groups).collect();
+            frame.set(Layer::BinColor(k as u8), mean(&group));
+        }
+        let samples = vec![renders.len() as f32 * spp as f32; first.width * first.height];
+        frame.set(Layer::Samples, Image { channels: 1, data: samples, ..first.clone() });
+        frame.set(Layer::Color, color);
+        frame.set(Layer::ColorVariance, variance);
+        Ok(frame)
+    }
+
+    /// Adds what layers of another program say of others: variances of features, of which those without any have no noise, and
+    /// halves of the samples. `spp` are the samples of every pixel where the layers do not say.
+    pub fn complete(&mut self, spp: Option<u32>) {
+        aovs::complete(self, &Pixels::default(), spp);
     }
 
     /// The same frame with its provenance.

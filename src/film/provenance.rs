@@ -45,6 +45,12 @@ impl Provenance {
         Self { version: env!("CARGO_PKG_VERSION").into(), ..Self::default() }
     }
 
+    /// The provenance of a render that has ended, with so many samples per pixel and seconds.
+    #[must_use]
+    pub fn after(self, spp: f64, seconds: f64) -> Self {
+        Self { spp: spp.round().to_string(), seconds: format!("{seconds:.3}"), ..self }
+    }
+
     fn values(&mut self) -> [&mut String; 9] {
         [
             &mut self.version,

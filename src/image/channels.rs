@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::io::{ImageFile, Storage};
+use super::io::{ImageFile, OpenImage, Storage};
 use crate::error::{Error, Result};
 use crate::math::{Rgb, srgb_decode, vec3};
 

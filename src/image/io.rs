@@ -1,16 +1,19 @@
-//! Image files, through OpenImageIO: colour images in and out, with the encoding each format expects.
+//! Image files, through OpenImageIO or, in builds without it, through libraries in Rust: colour images in and out, with the
+//! encoding each format expects.
 
 use std::path::Path;
 
 use super::Image;
 use super::channels::{ColorChannels, Integers};
+#[cfg(not(feature = "openimageio"))]
+use super::pure as library;
 use crate::error::{Error, Result};
-use crate::ffi::oiio;
-pub use crate::ffi::oiio::{
-    CachedTexture, DataWindow, ImageFile, Kind, Pixels, Storage, TextureSystem, failed_lookups, read,
-};
+#[cfg(feature = "openimageio")]
+use crate::ffi::oiio as library;
 use crate::files;
 use crate::math::srgb_encode;
+pub use crate::pixels::{DataWindow, Header, Kind, OpenImage, Pixels, Storage};
+pub use library::{CachedTexture, ImageFile, TextureSystem, failed_lookups};
 
 /// Formats that hold linear radiance as floats.
 const LINEAR: &[&str] = &["exr", "hdr", "pfm", "tif", "tiff"];
@@ -48,9 +51,14 @@ pub fn check_writable(path: &Path) -> Result<()> {
     Err(Error::Usage(format!("{}: the extension `{extension}` is not one of {formats}", path.display())))
 }
 
+/// Reads a whole image, and those of `attributes` that its header has.
+pub fn read(path: &Path, attributes: &[&str]) -> Result<Pixels> {
+    ImageFile::open(path)?.pixels(attributes)
+}
+
 /// Writes an image in the format of the path's extension, whole or not at all.
 pub fn write(path: &Path, pixels: &Pixels, kind: Kind, compression: Option<&str>) -> Result<()> {
-    files::replace(path, |part| oiio::write(part, pixels, kind, compression))
+    files::replace(path, |part| library::write(part, pixels, kind, compression))
 }
 
 /// Writes a linear RGB image: as it is to exr, hdr, pfm and tiff; exposed, clamped and sRGB-encoded to png and jpg, whose
@@ -144,6 +152,131 @@ pub fn read_color(path: &Path) -> Result<Image> {
 mod tests {
     use super::*;
     use crate::math::vec3;
+
+    /// A library of image files.
+    struct Library {
+        name: &'static str,
+        read: fn(&Path, &[&str]) -> Result<Pixels>,
+        write: fn(&Path, &Pixels, Kind, Option<&str>) -> Result<()>,
+    }
+
+    /// Every library that this build has.
+    const LIBRARIES: &[Library] = &[
+        #[cfg(feature = "openimageio")]
+        Library {
+            name: "OpenImageIO",
+            read: |path, attributes| crate::ffi::oiio::ImageFile::open(path)?.pixels(attributes),
+            write: crate::ffi::oiio::write,
+        },
+        Library {
+            name: "Rust",
+            read: |path, attributes| super::super::pure::ImageFile::open(path)?.pixels(attributes),
+            write: super::super::pure::write,
+        },
+    ];
+
+    /// Pairs of a library that writes and one that reads.
+    fn pairs() -> impl Iterator<Item = (&'static Library, &'static Library)> {
+        LIBRARIES.iter().flat_map(|writer| LIBRARIES.iter().map(move |reader| (writer, reader)))
+    }
+
+    /// Samples of one channel.
+    fn channel(pixels: &Pixels, name: &str) -> Vec<f32> {
+        let at = pixels.channels.iter().position(|other| other == name).unwrap();
+        pixels.data.iter().skip(at).step_by(pixels.channels.len()).copied().collect()
+    }
+
+    #[test]
+    fn exr_keeps_every_bit_name_and_attribute() {
+        let channels = ["R", "G", "B", "depth.Z"].map(String::from).to_vec();
+        let data: Vec<f32> = (0..3 * 2 * 4).map(|i| (i as f32).exp() * 1e-3).collect();
+        let attributes = vec![("fluxion:seed".to_owned(), "7".to_owned())];
+        for (writer, reader) in pairs() {
+            for window in [None, Some(DataWindow { origin: (5, 6), full: (10, 9) })] {
+                let file = tempfile::Builder::new().suffix(".exr").tempfile().unwrap();
+                let (channels, data, attributes) = (channels.clone(), data.clone(), attributes.clone());
+                let pixels = Pixels { width: 3, height: 2, channels, data, attributes, window };
+                (writer.write)(file.path(), &pixels, Kind::Float, Some("zips")).unwrap();
+                let back = (reader.read)(file.path(), &["fluxion:seed", "absent"]).unwrap();
+                assert_eq!((&back.attributes, back.window), (&pixels.attributes, window), "{}", reader.name);
+                for name in &pixels.channels {
+                    let bits = |pixels| channel(pixels, name).iter().map(|value| value.to_bits()).collect::<Vec<_>>();
+                    assert_eq!(bits(&back), bits(&pixels), "{} {} {name}", writer.name, reader.name);
+                }
+                (writer.write)(file.path(), &pixels, Kind::Half, None).unwrap();
+                let halves = channel(&(reader.read)(file.path(), &[]).unwrap(), "R");
+                let near = |(a, b): (&f32, f32)| (a - b).abs() <= b / 1024.0 || b > 65504.0;
+                assert!(halves.iter().zip(channel(&pixels, "R")).all(near), "{} {}", writer.name, reader.name);
+            }
+        }
+    }
+
+    #[test]
+    fn libraries_agree_on_every_format() {
+        let image = Image::from_rgb(40, 24, |x, y| vec3(x as f32 / 40.0, y as f32 / 24.0, 0.5));
+        let channels = ["R", "G", "B"].map(String::from).to_vec();
+        let pixels = Pixels { width: 40, height: 24, channels, data: image.data.clone(), ..Pixels::default() };
+        let folder = tempfile::tempdir().unwrap();
+        let kinds = [
+            ("a.tiff", Kind::Float, 0.0),
+            ("a.hdr", Kind::Float, 0.01),
+            ("a.png", Kind::Uint8, 0.003),
+            ("a.jpg", Kind::Uint8, 0.1),
+        ];
+        for (name, kind, tolerance) in kinds {
+            let path = folder.path().join(name);
+            for writer in LIBRARIES {
+                (writer.write)(&path, &pixels, kind, None).unwrap();
+                let read: Vec<_> = LIBRARIES.iter().map(|library| (library.read)(&path, &[]).unwrap()).collect();
+                for (library, back) in LIBRARIES.iter().zip(&read) {
+                    let worst = back.data.iter().zip(&pixels.data).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+                    assert!(worst <= tolerance, "{name} by {}, {}: {worst}", writer.name, library.name);
+                    // Decoders of jpg round in their own ways.
+                    let apart = back.data.iter().zip(&read[0].data).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+                    let most = if name == "a.jpg" { 0.02 } else { 0.0 };
+                    assert!(apart <= most && back.channels == read[0].channels, "{name} by {}: {apart}", writer.name);
+                }
+            }
+        }
+        let path = folder.path().join("a.pfm");
+        std::fs::write(&path, pfm(40, &image.data)).unwrap();
+        LIBRARIES.iter().for_each(|library| assert_eq!((library.read)(&path, &[]).unwrap().data, image.data));
+    }
+
+    #[test]
+    fn alpha_does_not_darken_colours() {
+        let channels = ["R", "G", "B", "A"].map(String::from).to_vec();
+        let pixels = Pixels { width: 1, height: 1, channels, data: vec![1.0, 0.4, 0.2, 0.0], ..Pixels::default() };
+        for (writer, reader) in pairs() {
+            let file = tempfile::Builder::new().suffix(".png").tempfile().unwrap();
+            (writer.write)(file.path(), &pixels, Kind::Uint8, None).unwrap();
+            let back = (reader.read)(file.path(), &[]).unwrap();
+            back.data.iter().zip(&pixels.data).for_each(|(a, b)| assert!((a - b).abs() < 1e-3, "{a} {b}"));
+        }
+    }
+
+    #[test]
+    fn missing_truncated_and_unwritable_files_are_errors_with_the_name() {
+        let pixels = Pixels { width: 1, height: 1, channels: vec!["R".into()], data: vec![1.0], ..Pixels::default() };
+        let folder = tempfile::tempdir().unwrap();
+        for library in LIBRARIES {
+            let missing = (library.read)(Path::new("/no/such.exr"), &[]).unwrap_err().to_string();
+            assert!(missing.starts_with("/no/such.exr: "), "{missing}");
+            for (name, bytes) in [
+                ("a.exr", &b"v/1\x01nothing more"[..]),
+                ("a.pfm", b"PF\n9 9\n-1\n"),
+                ("a.png", b"\x89PNG\r\n\x1a\n"),
+                ("a", b""),
+            ] {
+                let path = folder.path().join(name);
+                std::fs::write(&path, bytes).unwrap();
+                let truncated = (library.read)(&path, &[]).unwrap_err().to_string();
+                assert!(truncated.len() > path.display().to_string().len() + 5, "{}: {truncated}", library.name);
+            }
+            assert!((library.write)(Path::new("/no/such/folder/a.exr"), &pixels, Kind::Float, None).is_err());
+            assert!((library.write)(&folder.path().join("a.nosuchformat"), &pixels, Kind::Float, None).is_err());
+        }
+    }
 
     #[test]
     fn every_format_gives_back_what_it_can_hold() {

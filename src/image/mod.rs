@@ -6,6 +6,8 @@ pub mod nl_means;
 pub mod npy;
 pub mod oidn;
 pub mod planes;
+#[cfg(any(test, not(feature = "openimageio")))]
+mod pure;
 
 use crate::math::{Rgb, vec3};
 

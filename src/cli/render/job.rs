@@ -4,7 +4,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use anyhow::Result;
-use fluxion::adaptive::{self, AdaptiveOutcome, AdaptiveSettings, Allocator, Limits, Start};
+use fluxion::adaptive::{self, AdaptiveOutcome, AdaptiveSettings, Allocator, Start};
 use fluxion::film::{Frame, Needs, Provenance, exr};
 use fluxion::image::io::{DataWindow, failed_lookups};
 use fluxion::mattes::{self, MOST_SAMPLES};
@@ -118,12 +118,7 @@ impl Job<'_> {
     /// In passes that allocate samples to the pixels that need them.
     fn adaptive(&self, allocator: &dyn Allocator, start: Start, stats: &mut Stats) -> Result<Rendered> {
         let args = self.args;
-        let limits = Limits {
-            // Without any limit the scene says how much.
-            spp: args.spp.or((args.time.is_none() && args.target_error.is_none()).then_some(self.scene.sensor().spp)),
-            time: args.time,
-            error: args.target_error,
-        };
+        let limits = args.limits().or_samples(self.scene.sensor().spp);
         let settings = AdaptiveSettings {
             render: self.settings(start.render.film.needs, Budget::Spp(1)),
             method: self.method,
@@ -209,12 +204,11 @@ impl Job<'_> {
             scene: self.args.scene.file_name().unwrap_or_default().to_string_lossy().into_owned(),
             fingerprint: fingerprint(self.scene),
             seed: self.args.seed.to_string(),
-            spp: stats.spp.to_string(),
-            seconds: format!("{:.3}", stats.seconds.render),
             method: self.args.method.method.clone(),
             plan: stats.plan.clone(),
             kernel: stats.kernel.clone(),
             ..Provenance::new()
         }
+        .after(f64::from(stats.spp), stats.seconds.render)
     }
 }

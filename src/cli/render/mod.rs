@@ -9,13 +9,13 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Result, bail};
 use clap::builder::{PossibleValue, PossibleValuesParser};
-use fluxion::adaptive::{self, ALLOCATORS, Allocator, Goals, Start};
+use fluxion::adaptive::{self, ALLOCATORS, Allocator, Goals, Limits, Start};
 use fluxion::checkpoint::{Origin, Run, content};
 use fluxion::error::Error;
 use fluxion::film::Needs;
 use fluxion::neighbours::Selector;
 use fluxion::plan::Plan;
-use fluxion::reconstruct::{self, Reconstruction};
+use fluxion::reconstruct;
 use fluxion::reference::fingerprint;
 use fluxion::render::{self, RenderOutcome, SHIFTS, SampleId, Shift};
 use fluxion::scene::{Scene, load};
@@ -133,6 +133,11 @@ impl Args {
         Ok(super::scene::load(&self.scene, &options)?)
     }
 
+    /// Limits of the render.
+    fn limits(&self) -> Limits {
+        Limits { spp: self.spp, time: self.time, error: self.target_error }
+    }
+
     /// Checksum of the scene and the files that it names.
     pub fn content(&self) -> Result<String> {
         Ok(content(&self.load()?)?)
@@ -233,7 +238,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     };
     let sink = origin.zip(lock).and_then(|(origin, lock)| args.checkpoint.sink(origin, &start, lock));
     let viewer = viewer(args, &scene)?;
-    let allocator = allocator(args, method.as_ref())?;
+    let allocator = adaptive::chosen(args.adaptive.as_deref(), &args.limits(), method.as_ref())?;
     let (scene, method, sink, viewer) = (&scene, method.as_ref(), sink.as_ref(), viewer.as_ref());
     let done = Job { args, scene, method, allocator, kernel, goals, sink, viewer }.run(start, &mut stats);
     match sink {
@@ -242,13 +247,6 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     }
     report(args, &stats);
     Ok(ExitCode::SUCCESS)
-}
-
-/// The allocator that is asked for, or the default one where there is time or an error to decide by.
-fn allocator(args: &Args, method: &dyn Reconstruction) -> Result<Option<&'static dyn Allocator>> {
-    let by_default = (args.time.is_some() && method.estimates_error()) || args.target_error.is_some();
-    let name = args.adaptive.as_deref().or_else(|| by_default.then(|| ALLOCATORS[0].id()));
-    Ok(name.map(adaptive::allocator).transpose()?)
 }
 
 /// Sample counts that the film's pixels are to have, if a file says.

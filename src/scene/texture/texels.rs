@@ -6,7 +6,7 @@ use std::sync::{Arc, OnceLock};
 
 use crate::error::Result;
 use crate::image::channels::{ColorChannels, Decoding, Integers};
-use crate::image::io::{CachedTexture, ImageFile, TextureSystem};
+use crate::image::io::{CachedTexture, ImageFile, OpenImage, TextureSystem};
 use crate::math::{Rgb, half, srgb_decode, vec3};
 
 /// Part of an image file that is read.
@@ -189,7 +189,7 @@ fn decoded(decoding: Decoding) -> &'static [f32; 256] {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "openimageio"))]
 mod tests {
     use super::*;
     use crate::image::{Image, io};

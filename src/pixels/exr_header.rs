@@ -1,9 +1,11 @@
-//! A look at the headers of EXR files before OpenEXR reads them: it makes room for as many bytes as an attribute claims
-//! to have, and only then finds that the file has ended.
+//! A look at the headers of EXR files before a library reads them: OpenEXR makes room for as many bytes as an attribute
+//! claims to have, and only then finds that the file has ended.
 
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read, Seek};
 use std::path::Path;
+
+use crate::error::{Error, Result};
 
 const MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
 
@@ -13,8 +15,17 @@ const MAX_NAME: u64 = 255;
 /// Flag in the version of files of several parts, which have as many headers and an empty one after them.
 const MULTIPART: u8 = 0x10;
 
-/// Checks the headers of an EXR file; returns the fault, if there is one. Other files are not checked.
-pub fn validate(path: &Path) -> io::Result<Option<String>> {
+/// Fails if the headers of an EXR file are damaged. Other files are not checked.
+pub fn check(path: &Path) -> Result<()> {
+    match validate(path) {
+        Ok(None) => Ok(()),
+        Ok(Some(what)) => Err(Error::io(path, what)),
+        Err(error) => Err(Error::io(path, error)),
+    }
+}
+
+/// The fault in the headers of an EXR file, if there is one.
+fn validate(path: &Path) -> io::Result<Option<String>> {
     let file = File::open(path)?;
     let length = file.metadata()?.len();
     let mut from = BufReader::new(file);

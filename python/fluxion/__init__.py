@@ -1,0 +1,47 @@
+"""Gradient-domain path tracing and image reconstruction.
+
+    import fluxion
+
+    scene = fluxion.load_file("scene.xml", size=(640, 360))
+    rendering = fluxion.render(scene, spp=16)
+    fluxion.write_image("image.exr", rendering.image)
+
+Images are arrays of height, width and channels in 32-bit floats, in linear radiance. Those of frames and solutions are read-only
+and share the memory of their owner. Long work releases the interpreter's lock and ends soon after Ctrl-C.
+"""
+
+from . import data
+from ._fluxion import (
+    FluxionError,
+    Frame,
+    Rendering,
+    Scene,
+    Solution,
+    __version__,
+    compare,
+    load_file,
+    methods,
+    metrics,
+    read_image,
+    reconstruct,
+    render,
+    write_image,
+)
+
+__all__ = [
+    "FluxionError",
+    "Frame",
+    "Rendering",
+    "Scene",
+    "Solution",
+    "__version__",
+    "compare",
+    "data",
+    "load_file",
+    "methods",
+    "metrics",
+    "read_image",
+    "reconstruct",
+    "render",
+    "write_image",
+]

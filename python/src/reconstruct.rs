@@ -1,0 +1,95 @@
+//! Reconstructions.
+
+use std::sync::Arc;
+
+use fluxion::reconstruct::{Context, DEFAULT, Reconstruction, Solution as Solved, parse, solve};
+use numpy::PyArray3;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::array::view;
+use crate::error::raised;
+use crate::frame::Frame;
+use crate::work::{self, Link};
+
+/// A reconstructed image.
+#[pyclass(frozen, module = "fluxion")]
+pub struct Solution(pub Solved);
+
+#[pymethods]
+impl Solution {
+    /// The image in radiance, directly seen emitters included: height x width x 3.
+    #[getter]
+    fn image<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray3<f32>>> {
+        view(slf.as_any(), &slf.get().0.image)
+    }
+
+    /// Share of every pixel that is covered, if the frame has it.
+    #[getter]
+    fn alpha<'py>(slf: &Bound<'py, Self>) -> PyResult<Option<Bound<'py, PyArray3<f32>>>> {
+        slf.get().0.alpha.as_ref().map(|image| view(slf.as_any(), image)).transpose()
+    }
+
+    /// Expected squared error of each value, if the method estimates it.
+    #[getter]
+    fn error<'py>(slf: &Bound<'py, Self>) -> PyResult<Option<Bound<'py, PyArray3<f32>>>> {
+        slf.get().0.error.as_ref().map(|image| view(slf.as_any(), image)).transpose()
+    }
+
+    /// Intermediate images by their names, if they were asked for.
+    #[getter]
+    fn notes<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyDict>> {
+        let dict = PyDict::new(slf.py());
+        for note in &slf.get().0.notes {
+            dict.set_item(&note.name, view(slf.as_any(), &note.image)?)?;
+        }
+        Ok(dict)
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<fluxion.Solution of {}x{} pixels>", self.0.image.width, self.0.image.height)
+    }
+}
+
+/// How a method is to work.
+#[derive(Clone, Copy)]
+pub struct Wishes {
+    /// Megabytes besides the frame.
+    pub memory: Option<u64>,
+    /// Whether intermediate images are wanted.
+    pub notes: bool,
+}
+
+impl Wishes {
+    /// The context of a method, for a closure that takes progress.
+    pub fn context<'a>(self, progress: &'a dyn Fn(&str, f32)) -> Context<'a> {
+        Context { progress, memory: self.memory.map(|megabytes| megabytes << 20), notes: self.notes }
+    }
+
+    /// Reconstructs.
+    pub fn solve(self, method: &dyn Reconstruction, frame: &fluxion::Frame, link: &Link) -> fluxion::Result<Solved> {
+        let report = |stage: &str, share| link.report(stage, share);
+        solve(method, frame, &self.context(&report))
+    }
+}
+
+/// Makes an image of a frame by a method with its parameters, such as `"frgr:levels=2"`; `fluxion.methods()` lists them.
+///
+/// `memory` bounds what the method uses besides the frame, in megabytes; with `notes` intermediate images are kept; `threads`
+/// is the number of threads (0: one per core); `progress` is called with the stage and the finished share.
+#[pyfunction]
+#[pyo3(signature = (frame, method=DEFAULT, *, memory=None, notes=false, threads=0, progress=None))]
+pub fn reconstruct(
+    py: Python<'_>,
+    frame: &Frame,
+    method: &str,
+    memory: Option<u64>,
+    notes: bool,
+    threads: usize,
+    progress: Option<&Bound<'_, PyAny>>,
+) -> PyResult<Solution> {
+    let method = parse(method).map_err(raised)?;
+    let (frame, wishes) = (Arc::clone(&frame.0), Wishes { memory, notes });
+    let solved = work::run(py, threads, progress, move |link| wishes.solve(method.as_ref(), &frame, link))?;
+    Ok(Solution(solved))
+}

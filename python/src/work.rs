@@ -1,0 +1,94 @@
+//! Long work on a thread of its own, without the interpreter's lock, while this one listens for Ctrl-C and reports progress.
+
+use std::panic::resume_unwind;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread;
+use std::time::Duration;
+
+use fluxion::error::{Error, Result};
+use pyo3::exceptions::PyRuntimeError;
+use pyo3::prelude::*;
+
+use crate::error::raised;
+
+/// Time between two looks for signals.
+const PAUSE: Duration = Duration::from_millis(50);
+/// Stack of the thread, as that of a program's first one.
+const STACK: usize = 8 << 20;
+
+/// Connections of the work to its caller.
+#[derive(Clone, Default)]
+pub struct Link {
+    /// Set when the caller has gone away.
+    pub stop: Arc<AtomicBool>,
+    stage: Arc<Mutex<(String, f32)>>,
+}
+
+impl Link {
+    /// Sets the stage and the finished share, and ends the thread if nobody waits for it any more.
+    pub fn report(&self, stage: &str, share: f32) {
+        if self.stop.load(Ordering::Relaxed) {
+            // There is nobody left to return to: what unwinds is let go of with the thread.
+            resume_unwind(Box::new("interrupted"));
+        }
+        self.set(stage, share);
+    }
+
+    /// Sets the stage and the finished share.
+    pub fn set(&self, stage: &str, share: f32) {
+        let mut now = self.stage.lock().unwrap_or_else(PoisonError::into_inner);
+        if now.0 != stage {
+            stage.clone_into(&mut now.0);
+        }
+        now.1 = share;
+    }
+
+    fn stage(&self) -> (String, f32) {
+        self.stage.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+}
+
+/// Does the work with so many threads (0: one per core). `progress` is called with the stage and the finished share. What an
+/// exception interrupts ends soon after, by itself.
+pub fn run<T: Send + 'static>(
+    py: Python<'_>,
+    threads: usize,
+    progress: Option<&Bound<'_, PyAny>>,
+    work: impl FnOnce(&Link) -> Result<T> + Send + 'static,
+) -> PyResult<T> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+    let pool = (threads > 0).then(|| pool.build()).transpose();
+    let pool = pool.map_err(|error| raised(Error::Usage(format!("{threads} threads: {error}"))))?;
+    let link = Link::default();
+    let (sender, receiver) = channel();
+    let receiver = Mutex::new(receiver);
+    let of_thread = link.clone();
+    let work = move || {
+        let done = match &pool {
+            Some(pool) => pool.install(|| work(&of_thread)),
+            None => work(&of_thread),
+        };
+        // Nobody may be waiting any more.
+        let _ = sender.send(done);
+    };
+    thread::Builder::new().stack_size(STACK).spawn(work)?;
+    loop {
+        let wait = || receiver.lock().unwrap_or_else(PoisonError::into_inner).recv_timeout(PAUSE);
+        match py.detach(wait) {
+            Ok(done) => return done.map_err(raised),
+            Err(RecvTimeoutError::Timeout) => {
+                let report = |progress: &Bound<'_, PyAny>| progress.call1(link.stage()).map(drop);
+                let heard = py.check_signals().and_then(|()| progress.map_or(Ok(()), report));
+                if heard.is_err() {
+                    link.stop.store(true, Ordering::Relaxed);
+                    heard?;
+                }
+            }
+            Err(RecvTimeoutError::Disconnected) => {
+                return Err(PyRuntimeError::new_err("the work ended without a result: a fault of fluxion itself"));
+            }
+        }
+    }
+}

@@ -1,0 +1,122 @@
+//! OpenEXR files: the first part, at its full resolution.
+
+use std::collections::HashMap;
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
+use exr::image::write::WritableImage;
+use exr::image::{AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer};
+use exr::meta::MetaData;
+use exr::meta::attribute::{AttributeValue, IntegerBounds, SampleType, Text};
+use exr::meta::header::LayerAttributes;
+use exr::prelude::{Blocks, Compression, LineOrder, ReadChannels, ReadLayers, f16, read};
+
+use super::{Format, Samples};
+use crate::error::{Error, Result};
+use crate::pixels::{DataWindow, Header, Kind, Pixels, Storage};
+
+/// Number that exr files begin with.
+const MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
+
+/// Whether a file says that it is one.
+pub fn is_exr(path: &Path) -> bool {
+    let mut magic = [0; 4];
+    File::open(path).and_then(|mut file| file.read_exact(&mut magic)).is_ok() && magic == MAGIC
+}
+
+/// Strings of a header.
+struct Exr(HashMap<String, String>);
+
+/// Reads a header.
+pub fn open(path: &Path) -> Result<(Header, Box<dyn Format>)> {
+    let found = MetaData::read_from_file(path, false).map_err(|error| Error::io(path, error))?;
+    let part = found.headers.first().ok_or_else(|| Error::io(path, "the file has no part"))?;
+    if part.deep {
+        return Err(Error::io(path, "volumes and deep images are not supported"));
+    }
+    let (size, origin) = (part.layer_size, part.own_attributes.layer_position);
+    let full = part.shared_attributes.display_window;
+    let unsigned = |n: i32| usize::try_from(n).ok();
+    let window = match [origin.0 - full.position.0, origin.1 - full.position.1].map(unsigned) {
+        [Some(x), Some(y)] if (origin, size) != (full.position, full.size) => {
+            Some(DataWindow { origin: (x, y), full: (full.size.0, full.size.1) })
+        }
+        _ => None,
+    };
+    let storage = |kind| if kind == SampleType::U32 { Storage::Unsigned(32) } else { Storage::Float };
+    let channels = &part.channels.list;
+    let header = Header {
+        width: size.0,
+        height: size.1,
+        origin: (origin.0, origin.1),
+        channels: channels.iter().map(|channel| channel.name.to_string()).collect(),
+        storage: channels.iter().map(|channel| storage(channel.sample_type)).collect(),
+        window,
+        format: "openexr".into(),
+    };
+    let all = part.own_attributes.other.iter().chain(&part.shared_attributes.other);
+    let text = |(name, value): (&Text, &AttributeValue)| match value {
+        AttributeValue::Text(text) => Some((name.to_string(), text.to_string())),
+        _ => None,
+    };
+    let mut strings: HashMap<_, _> = all.filter_map(text).collect();
+    if let Some(primaries) = part.shared_attributes.chromaticities {
+        let points = [primaries.red, primaries.green, primaries.blue, primaries.white];
+        let numbers: Vec<_> = points.iter().flat_map(|point| [point.0.to_string(), point.1.to_string()]).collect();
+        strings.insert("chromaticities".into(), numbers.join(", "));
+    }
+    Ok((header, Box::new(Exr(strings))))
+}
+
+impl Format for Exr {
+    fn attribute(&self, name: &str) -> Option<String> {
+        self.0.get(name).cloned()
+    }
+
+    fn samples(&self, path: &Path) -> Result<Samples> {
+        let image =
+            read().no_deep_data().largest_resolution_level().all_channels().first_valid_layer().all_attributes();
+        let image = image.from_file(path).map_err(|error| Error::io(path, error))?;
+        let channels = image.layer_data.channel_data.list;
+        let (count, pixels) = (channels.len(), image.layer_data.size.area());
+        let mut data = vec![0.0; count * pixels];
+        for (k, channel) in channels.into_iter().enumerate() {
+            let slots = data.iter_mut().skip(k).step_by(count);
+            match channel.sample_data {
+                FlatSamples::F16(values) => slots.zip(values).for_each(|(slot, value)| *slot = value.to_f32()),
+                FlatSamples::F32(values) => slots.zip(values).for_each(|(slot, value)| *slot = value),
+                FlatSamples::U32(values) => {
+                    let share = |value: u32| (f64::from(value) / f64::from(u32::MAX)) as f32;
+                    slots.zip(values).for_each(|(slot, value)| *slot = share(value));
+                }
+            }
+        }
+        Ok(Samples::Floats(data))
+    }
+}
+
+/// Writes all channels, in floats of the given kind.
+pub fn write(path: &Path, pixels: &Pixels, kind: Kind, compression: Option<&str>) -> Result<()> {
+    let size = (pixels.width, pixels.height);
+    let channel = |(k, name): (usize, &String)| {
+        let values = pixels.data.iter().skip(k).step_by(pixels.channels.len());
+        let samples = match kind {
+            Kind::Half => FlatSamples::F16(values.map(|&value| f16::from_f32(value)).collect()),
+            Kind::Float | Kind::Uint8 => FlatSamples::F32(values.copied().collect()),
+        };
+        AnyChannel::new(name.as_str(), samples)
+    };
+    let channels = AnyChannels::sort(pixels.channels.iter().enumerate().map(channel).collect());
+    let window = pixels.window.unwrap_or(DataWindow { origin: (0, 0), full: size });
+    let layer_position = (window.origin.0 as i32, window.origin.1 as i32).into();
+    let mut attributes = LayerAttributes { layer_position, ..LayerAttributes::default() };
+    let texts =
+        pixels.attributes.iter().map(|(name, text)| (name.as_str().into(), AttributeValue::Text(text.as_str().into())));
+    attributes.other.extend(texts);
+    let compression = if compression == Some("zips") { Compression::ZIP1 } else { Compression::Uncompressed };
+    let encoding = Encoding { compression, blocks: Blocks::ScanLines, line_order: LineOrder::Increasing };
+    let mut image = Image::from_layer(Layer::new(size, attributes, encoding, channels));
+    image.attributes.display_window = IntegerBounds::from_dimensions(window.full);
+    image.write().to_file(path).map_err(|error| Error::io(path, error))
+}
