@@ -6,7 +6,7 @@ PACKAGES = g++ pkg-config libclang-dev libembree-dev libopenimageio-dev
 TEST_PACKAGES = chromium
 SCENE = scenes/cornell-box/scene.xml
 
-.PHONY: demo test packages check licences memcheck train-net train-blend train-gradnet train-kernels
+.PHONY: demo test packages check licences wheel memcheck train-net train-blend train-gradnet train-kernels
 
 demo: packages
 	cargo build --release
@@ -27,6 +27,7 @@ test: packages
 check: packages
 	cargo fmt --check
 	cargo clippy --profile checked --all-targets -- -D warnings
+	cd python && cargo fmt --check && CARGO_TARGET_DIR=../target/python cargo clippy -- -D warnings
 	RUSTDOCFLAGS="-D warnings" cargo doc --no-deps
 
 # Licences and sources of all dependencies. Advisories are not looked at here, since that takes an internet connection:
@@ -34,6 +35,14 @@ check: packages
 licences:
 	@command -v cargo-deny > /dev/null || cargo install cargo-deny --locked
 	cargo deny check licenses bans sources
+	cargo deny --manifest-path python/Cargo.toml --config deny.toml check licenses bans sources
+
+# The Python module with everything it needs in it, tested in an environment of its own.
+wheel: packages
+	@sh .ci/packages python3-venv
+	cargo build --release
+	python/build target/wheels
+	python/check target/wheels target/release/fluxion
 
 # Small renders under valgrind, which lacks some vector instructions: without them.
 memcheck: packages

@@ -37,7 +37,8 @@ impl Plan {
             _ if wanted.bins => wanted.with_every_difference().edges,
             _ => wanted.edges,
         };
-        let needs = Needs { edges, alpha: scene.sensor().wants_alpha(), ..wanted };
+        let lights = scene.light_groups().count() as u8;
+        let needs = Needs { edges, alpha: scene.sensor().wants_alpha(), lights, ..wanted };
         let mut items = of_film(scene, method, saved, needs);
         items.extend(of_scene(scene, needs));
         Self { needs, items }
@@ -63,7 +64,7 @@ impl Plan {
         for item in &mut plan.items {
             (item.computed, item.reason) = (true, "everything is asked for".to_owned());
         }
-        Self { needs: Needs::ALL, ..plan }
+        Self { needs: Needs { lights: plan.needs.lights, ..Needs::ALL }, ..plan }
     }
 
     /// One line: `+gradients -features -bins`.
@@ -135,6 +136,14 @@ fn of_film(scene: &Scene, method: Needs, saved: Needs, needs: Needs) -> Vec<Item
             computed: needs.alpha,
             reason: if needs.alpha { "the film's pixel_format has alpha" } else { "the film's pixel_format has none" }
                 .into(),
+        },
+        Item {
+            name: "lights",
+            computed: needs.lights > 0,
+            reason: match needs.lights {
+                0 => "no light group is asked for".into(),
+                count => format!("{count} light groups are recorded by themselves"),
+            },
         },
     ]
 }

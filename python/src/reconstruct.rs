@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use fluxion::reconstruct::{Context, DEFAULT, Reconstruction, Solution as Solved, parse, solve};
+use fluxion::reconstruct::{Context, DEFAULT, Note, Reconstruction, light_groups, parse, solve};
 use numpy::PyArray3;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -16,39 +16,68 @@ use crate::work::{self, Link};
 #[pyclass(frozen, module = "fluxion")]
 pub struct Solution(pub Solved);
 
+/// A solution with the images of its light groups.
+pub struct Solved {
+    pub solution: fluxion::Solution,
+    pub lights: Vec<Note>,
+}
+
+impl Solved {
+    /// A solution of a frame by a method.
+    pub fn new(
+        method: &dyn Reconstruction,
+        frame: &fluxion::Frame,
+        solution: fluxion::Solution,
+    ) -> fluxion::Result<Self> {
+        let lights = light_groups(method, frame, &solution)?;
+        Ok(Self { solution, lights })
+    }
+}
+
 #[pymethods]
 impl Solution {
     /// The image in radiance, directly seen emitters included: height x width x 3.
     #[getter]
     fn image<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray3<f32>>> {
-        view(slf.as_any(), &slf.get().0.image)
+        view(slf.as_any(), &slf.get().0.solution.image)
     }
 
     /// Share of every pixel that is covered, if the frame has it.
     #[getter]
     fn alpha<'py>(slf: &Bound<'py, Self>) -> PyResult<Option<Bound<'py, PyArray3<f32>>>> {
-        slf.get().0.alpha.as_ref().map(|image| view(slf.as_any(), image)).transpose()
+        slf.get().0.solution.alpha.as_ref().map(|image| view(slf.as_any(), image)).transpose()
     }
 
     /// Expected squared error of each value, if the method estimates it.
     #[getter]
     fn error<'py>(slf: &Bound<'py, Self>) -> PyResult<Option<Bound<'py, PyArray3<f32>>>> {
-        slf.get().0.error.as_ref().map(|image| view(slf.as_any(), image)).transpose()
+        slf.get().0.solution.error.as_ref().map(|image| view(slf.as_any(), image)).transpose()
     }
 
     /// Intermediate images by their names, if they were asked for.
     #[getter]
     fn notes<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyDict>> {
-        let dict = PyDict::new(slf.py());
-        for note in &slf.get().0.notes {
-            dict.set_item(&note.name, view(slf.as_any(), &note.image)?)?;
-        }
-        Ok(dict)
+        images(slf, &slf.get().0.solution.notes)
+    }
+
+    /// The light of groups of emitters by their names, if the frame has it; the images add up to `image`.
+    #[getter]
+    fn lights<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyDict>> {
+        images(slf, &slf.get().0.lights)
     }
 
     fn __repr__(&self) -> String {
-        format!("<fluxion.Solution of {}x{} pixels>", self.0.image.width, self.0.image.height)
+        format!("<fluxion.Solution of {}x{} pixels>", self.0.solution.image.width, self.0.solution.image.height)
     }
+}
+
+/// Images by their names.
+fn images<'py>(owner: &Bound<'py, Solution>, notes: &[Note]) -> PyResult<Bound<'py, PyDict>> {
+    let dict = PyDict::new(owner.py());
+    for note in notes {
+        dict.set_item(&note.name, view(owner.as_any(), &note.image)?)?;
+    }
+    Ok(dict)
 }
 
 /// How a method is to work.
@@ -69,7 +98,7 @@ impl Wishes {
     /// Reconstructs.
     pub fn solve(self, method: &dyn Reconstruction, frame: &fluxion::Frame, link: &Link) -> fluxion::Result<Solved> {
         let report = |stage: &str, share| link.report(stage, share);
-        solve(method, frame, &self.context(&report))
+        Solved::new(method, frame, solve(method, frame, &self.context(&report))?)
     }
 }
 

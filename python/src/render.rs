@@ -18,7 +18,7 @@ use pyo3::prelude::*;
 
 use crate::error::raised;
 use crate::frame::Frame;
-use crate::reconstruct::{Solution, Wishes};
+use crate::reconstruct::{Solution, Solved, Wishes};
 use crate::scene::SceneOrPath;
 use crate::work::{self, Link};
 
@@ -68,6 +68,12 @@ impl Rendering {
         self.solution.bind(py).getattr("notes")
     }
 
+    /// The light of groups of emitters by their names, if they were asked for; the images add up to `image`.
+    #[getter]
+    fn lights<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.solution.bind(py).getattr("lights")
+    }
+
     fn __repr__(&self) -> String {
         format!("<fluxion.Rendering with {} samples a pixel in {:.2} s>", self.spp, self.seconds)
     }
@@ -87,7 +93,7 @@ struct Job {
 /// A render that has ended.
 struct Done {
     frame: fluxion::Frame,
-    solution: fluxion::Solution,
+    solution: Solved,
     spp: f64,
     seconds: f64,
 }
@@ -108,7 +114,8 @@ impl Job {
                 let settings = AdaptiveSettings { render, method, allocator, limits, reconstruction: None };
                 let report = |stage: &str, share| link.report(stage, share);
                 let done = adaptive::run(&self.scene, &settings, &control, &self.wishes.context(&report))?;
-                (done.render, done.frame, done.solution)
+                let solution = Solved::new(method, &done.frame, done.solution)?;
+                (done.render, done.frame, solution)
             }
         };
         let (spp, seconds) = (render.film.mean_spp(), render.elapsed.as_secs_f64());

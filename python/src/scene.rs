@@ -15,9 +15,10 @@ use crate::work;
 /// A scene that has been read, ready to be rendered.
 #[pyclass(frozen, module = "fluxion")]
 pub struct Scene {
-    pub scene: Arc<fluxion::Scene>,
-    pub path: PathBuf,
-    pub options: Options,
+    scene: Arc<fluxion::Scene>,
+    path: PathBuf,
+    options: Options,
+    light_groups: Option<String>,
 }
 
 /// Reads a scene file in the format of Mitsuba 3.
@@ -25,9 +26,10 @@ pub struct Scene {
 /// Keywords that are none of the options give the file's parameters (`$name`) values, over its `<default>`s. `size` is the
 /// film's width and height, `crop` the column, row, width and height of the part to render, `sensor` an id or a number,
 /// `max_depth` the longest path in edges, `threads` the number of threads that build the scene (0: one per core),
-/// `texture_memory` megabytes. Warnings of the reader are Python's; with `strict` they are errors.
+/// `texture_memory` megabytes. `light_groups` names groups of emitters whose light is recorded by itself, by patterns of their ids or
+/// those of their shapes: `"key=lamp*,fill=window*,rest"`. Warnings of the reader are Python's; with `strict` they are errors.
 #[pyfunction]
-#[pyo3(signature = (path, *, size=None, crop=None, sensor=None, max_depth=None, strict=false, threads=0, texture_memory=4096, **defines))]
+#[pyo3(signature = (path, *, size=None, crop=None, sensor=None, max_depth=None, strict=false, threads=0, texture_memory=4096, light_groups=None, **defines))]
 #[allow(clippy::too_many_arguments)]
 pub fn load_file(
     py: Python<'_>,
@@ -39,6 +41,7 @@ pub fn load_file(
     strict: bool,
     threads: usize,
     texture_memory: u64,
+    light_groups: Option<String>,
     defines: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<Scene> {
     let define = |(name, value): (Bound<'_, PyAny>, Bound<'_, PyAny>)| Ok((name.extract()?, text(&value)?));
@@ -56,7 +59,7 @@ pub fn load_file(
     if size.is_some_and(|(width, height)| width == 0 || height == 0) {
         return Err(PyValueError::new_err("a film has at least one pixel"));
     }
-    load(py, path, options)
+    load(py, path, options, light_groups)
 }
 
 /// A value as scene files have it.
@@ -65,14 +68,18 @@ fn text(value: &Bound<'_, PyAny>) -> PyResult<String> {
     Ok(if value.is_instance_of::<pyo3::types::PyBool>() { text.to_lowercase() } else { text })
 }
 
-fn load(py: Python<'_>, path: PathBuf, options: Options) -> PyResult<Scene> {
-    let (from, by) = (path.clone(), options.clone());
-    let scene = work::run(py, 0, None, move |_| load::load(&from, &by))?;
+fn load(py: Python<'_>, path: PathBuf, options: Options, light_groups: Option<String>) -> PyResult<Scene> {
+    let (from, by, groups) = (path.clone(), options.clone(), light_groups.clone());
+    let scene = work::run(py, 0, None, move |_| {
+        let mut scene = load::load(&from, &by)?;
+        groups.map_or(Ok(()), |groups| scene.group_lights(&groups))?;
+        Ok(scene)
+    })?;
     let category = py.get_type::<PyUserWarning>();
     for warning in scene.warnings() {
         PyErr::warn(py, &category, &CString::new(warning.replace('\0', " "))?, 2)?;
     }
-    Ok(Scene { scene: Arc::new(scene), path, options })
+    Ok(Scene { scene: Arc::new(scene), path, options, light_groups })
 }
 
 #[pymethods]
@@ -118,7 +125,7 @@ impl Scene {
         match size {
             Some(size) if size != (self.width(), self.height()) => {
                 let options = Options { size: Some(size), ..self.options.clone() };
-                Ok(load(py, self.path.clone(), options)?.scene)
+                Ok(load(py, self.path.clone(), options, self.light_groups.clone())?.scene)
             }
             _ => Ok(Arc::clone(&self.scene)),
         }
@@ -138,7 +145,7 @@ impl SceneOrPath<'_> {
         match self {
             Self::Scene(scene) => Ok((scene.get().sized(py, size)?, scene.get().path.clone())),
             Self::Path(path) => {
-                let scene = load(py, path, Options { size, ..Options::default() })?;
+                let scene = load(py, path, Options { size, ..Options::default() }, None)?;
                 Ok((scene.scene, scene.path))
             }
         }

@@ -106,7 +106,9 @@ def test_memory_does_not_grow(scene_file):
         (lambda file: fluxion.render(file, time=-1.0), ValueError, "positive"),
         (lambda file: fluxion.render(file, kernel="structure", method="frgr"), ValueError, "direct neighbours"),
         (lambda file: fluxion.render(file, adaptive="nosuch"), ValueError, "allocator `nosuch`"),
-        (lambda file: fluxion.load_file(file, sensor="nosuch"), fluxion.FluxionError, "scene.xml"),
+        (lambda file: fluxion.load_file(file, sensor="nosuch"), ValueError, "no sensor `nosuch`"),
+        (lambda file: fluxion.load_file(file, nosuch=1), ValueError, "no parameter `nosuch`"),
+        (lambda file: fluxion.load_file(file, light_groups="key=nosuch*"), ValueError, "fits no emitter"),
     ],
 )
 def test_errors_are_exceptions_with_the_programs_text(scene_file, work, error, text):
@@ -132,5 +134,13 @@ def test_parameters_and_warnings(tmp_path):
     image = lambda scene: fluxion.render(scene, spp=1, method="primal").image
     assert np.allclose(image(fluxion.load_file(path)), 0.5)
     assert np.allclose(image(fluxion.load_file(path, grey=0.25)), 0.25)
-    with pytest.warns(UserWarning, match="nosuch"):
-        fluxion.load_file(path, nosuch=1)
+    path.write_text(path.read_text().replace("<emitter", '<integrator type="bdpt"/><emitter'))
+    with pytest.warns(UserWarning, match="scene.xml:1: .*bdpt"):
+        assert fluxion.load_file(path).warnings
+
+
+def test_light_groups_add_up(tmp_path, program, scene_file):
+    scene = fluxion.load_file(scene_file, size=SIZE, light_groups="all")
+    rendering = fluxion.render(scene, spp=4)
+    assert list(rendering.lights) == ["all"] and np.allclose(rendering.lights["all"], rendering.image, rtol=1e-5)
+    assert np.array_equal(rendering.image, fluxion.render(scene_file, size=SIZE, spp=4).image)

@@ -30,11 +30,11 @@ use crate::render::SampleId;
 const MAGIC: [u8; 8] = *b"FLUXCKPT";
 
 /// Version of the format: raised whenever the bytes change their meaning.
-const VERSION: u32 = 4;
+const VERSION: u32 = 5;
 /// The oldest version that is read.
 const OLDEST: u32 = 2;
-/// The version whose films have no alpha, and the number of statistics that they have.
-const WITHOUT_ALPHA: (u32, usize) = (2, 10);
+/// Versions whose films have fewer statistics, without alpha and without lights: the latest of each, with their number.
+const FEWER: [(u32, usize); 2] = [(2, 10), (4, 11)];
 
 /// Headers longer than this are damaged.
 const MAX_HEADER: u32 = 1 << 24;
@@ -209,7 +209,7 @@ impl Reader {
                 Kernel::Chosen(Arc::new(Neighbours::new(size, masks, directed).weighted(weights)))
             }
         };
-        let statistics = (version == WITHOUT_ALPHA.0).then_some(WITHOUT_ALPHA.1);
+        let statistics = FEWER.iter().find(|(latest, _)| version <= *latest).map(|(_, count)| *count);
         Ok(Self { path: path.to_path_buf(), from, length, header, kernel, statistics })
     }
 
@@ -270,6 +270,9 @@ fn header(from: &mut impl Read, length: u64) -> io::Result<(Header, u32)> {
     let mut header = vec![0; count as usize];
     from.read_exact(&mut header)?;
     let header: Header = serde_json::from_slice(&header).map_err(|error| invalid(error.to_string()))?;
+    if header.origin.lights.len() != usize::from(header.origin.needs.lights) {
+        return Err(invalid("its header names other light groups than the film has".into()));
+    }
     let (width, height) = header.origin.size;
     let pixels = width.checked_mul(height).filter(|&pixels| pixels > 0);
     // Nothing is allocated for more pixels than the file has bytes for.

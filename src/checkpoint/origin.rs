@@ -38,6 +38,9 @@ pub struct Origin {
     /// Neighbours that paths are shifted to.
     #[serde(default)]
     pub kernel: Selector,
+    /// Groups of emitters whose light is recorded by itself.
+    #[serde(default)]
+    pub lights: Vec<String>,
     /// Numbers of the samples; a merged film has those of several runs.
     pub runs: Vec<Run>,
 }
@@ -73,6 +76,9 @@ impl Origin {
     /// reason why not.
     pub fn adds_to(&self, other: &Self) -> Result<(), String> {
         self.same_view(other)?;
+        if self.lights != other.lights {
+            return Err(format!("has other light groups: {}", self.lights_text()));
+        }
         if self.needs != other.needs {
             return Err("records other statistics: both must be rendered for methods with the same needs".into());
         }
@@ -95,6 +101,9 @@ impl Origin {
     /// Checks that a film of this origin can be continued as `wanted`. The error is the reason why not.
     pub fn resumes(&self, wanted: &Self) -> Result<(), String> {
         self.same_view(wanted)?;
+        if self.lights != wanted.lights {
+            return Err(format!("was started with other light groups: {}", self.lights_text()));
+        }
         if !self.needs.cover(wanted.needs) {
             return Err("records less than this method and these layers need: start anew, or choose others".into());
         }
@@ -106,6 +115,10 @@ impl Origin {
             return Err(format!("was started with --seed {}{first}: give it the same", mine.seed));
         }
         Ok(())
+    }
+
+    fn lights_text(&self) -> String {
+        if self.lights.is_empty() { "none".into() } else { self.lights.join(", ") }
     }
 
     fn same_view(&self, other: &Self) -> Result<(), String> {

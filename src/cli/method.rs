@@ -86,15 +86,33 @@ impl Args {
     }
 }
 
-/// Writes the image to every output, with estimated error and sample counts where the format has layers, and takes the
-/// time. If it cannot be written anywhere, it goes to the folder for temporary files.
-pub fn write(args: &Args, outputs: &[PathBuf], solution: &Solution, frame: &Frame, stats: &mut Stats) -> Result<()> {
+/// Writes the image to every output, with estimated error, sample counts and the light of groups of emitters where the format has
+/// layers, and takes the time. If it cannot be written anywhere, it goes to the folder for temporary files.
+pub fn write(
+    (args, method): (&Args, &dyn Reconstruction),
+    outputs: &[PathBuf],
+    solution: &Solution,
+    frame: &Frame,
+    stats: &mut Stats,
+) -> Result<()> {
+    let start = Instant::now();
+    let lights = if outputs.iter().any(|path| io::has_layers(path)) {
+        reconstruct::light_groups(method, frame, solution)?
+    } else {
+        Vec::new()
+    };
+    let lights: Vec<_> = lights.into_iter().map(|note| (format!("light.{}", note.name), note.image)).collect();
+    stats.seconds.reconstruct += start.elapsed().as_secs_f64();
     let start = Instant::now();
     let error = solution.error.as_ref().map(|error| ("error", error));
     let samples = frame.get(Layer::Samples).map(|samples| ("samples", samples));
     let extras = Extras {
         alpha: solution.alpha.as_ref().or(frame.get(Layer::Alpha)),
-        layers: error.into_iter().chain(samples).collect(),
+        layers: error
+            .into_iter()
+            .chain(samples)
+            .chain(lights.iter().map(|(name, image)| (name.as_str(), image)))
+            .collect(),
         attributes: frame.provenance.attributes(),
         window: frame.window,
         exposure: args.exposure,

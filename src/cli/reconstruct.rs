@@ -56,7 +56,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     (stats.samples, stats.rejected) = (sum(Layer::Samples) as u64, sum(Layer::Rejected) as u64);
     let solution = args.method.solve(method.as_ref(), &frame, args.quiet, &mut stats)?;
     frame.provenance.method.clone_from(&args.method.method);
-    method::write(&args.method, &args.output, &solution, &frame, &mut stats)?;
+    method::write((&args.method, method.as_ref()), &args.output, &solution, &frame, &mut stats)?;
     if let Some(path) = &args.json {
         stats.save(path)?;
     }

@@ -21,6 +21,7 @@ impl Film {
             Kernel::Pending => frame.set_edges(Edges::new((self.width, self.height), [])),
             Kernel::Chosen(neighbours) => frame.set_edges(self.joined(neighbours)),
         }
+        frame.lights = self.develop_lights();
         frame
     }
 
@@ -74,7 +75,7 @@ impl Film {
     }
 
     /// An image from a function of tile, index in the tile, and channel.
-    fn image(&self, channels: usize, value: impl Fn(&Tile, usize, usize) -> f32 + Sync) -> Image {
+    pub(super) fn image(&self, channels: usize, value: impl Fn(&Tile, usize, usize) -> f32 + Sync) -> Image {
         let mut image = Image::new(self.width, self.height, channels);
         let row = self.width * channels;
         let bands = image.data.par_chunks_mut(super::TILE * row.max(1));

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{Frame, Layer, Provenance, aovs, edge_layers};
+use super::{Frame, Layer, LightLayers, Provenance, aovs, edge_layers};
 use crate::error::{Error, Result};
 use crate::image::Image;
 use crate::image::io::{Kind, Pixels, read, write};
@@ -11,15 +11,16 @@ use crate::image::io::{Kind, Pixels, read, write};
 pub fn save(path: &Path, frame: &Frame) -> Result<()> {
     let present: Vec<_> = frame.present().collect();
     let own_edges = frame.own_edges().map(edge_layers::channels).transpose().map_err(|why| Error::io(path, why))?;
-    let own_edges = own_edges.unwrap_or_default();
+    let mut others = own_edges.unwrap_or_default();
+    others.extend(frame.lights.iter().flat_map(LightLayers::channels));
     let of_layers = present.iter().flat_map(|(layer, _)| layer.channel_names());
-    let channels: Vec<String> = of_layers.chain(own_edges.iter().map(|(name, _)| name.clone())).collect();
+    let channels: Vec<String> = of_layers.chain(others.iter().map(|(name, _)| name.clone())).collect();
     let mut data = Vec::with_capacity(frame.width * frame.height * channels.len());
     for pixel in 0..frame.width * frame.height {
         for (_, image) in &present {
             data.extend_from_slice(&image.data[pixel * image.channels..(pixel + 1) * image.channels]);
         }
-        data.extend(own_edges.iter().map(|(_, values)| values[pixel]));
+        data.extend(others.iter().map(|(_, values)| values[pixel]));
     }
     let (width, height, attributes) = (frame.width, frame.height, frame.provenance.attributes());
     write(path, &Pixels { width, height, channels, data, window: frame.window, attributes }, Kind::Float, Some("zips"))
@@ -57,6 +58,7 @@ pub fn load_counted(path: &Path, spp: Option<u32>) -> Result<Frame> {
     if let Some(edges) = edge_layers::edges(&frame, channel) {
         frame.set_edges(edges);
     }
+    frame.lights = LightLayers::of_file((frame.width, frame.height), &pixels.channels, channel);
     frame.window = pixels.window;
     Ok(frame)
 }

@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use rayon::prelude::*;
 
 use super::layer::Layer;
-use super::{BINS, Cross, EdgeParts, Edges, Provenance, aovs, bin_count};
+use super::{BINS, Cross, EdgeParts, Edges, LightLayers, Provenance, aovs, bin_count};
 use crate::error::{Error, Result};
 use crate::image::Image;
 use crate::image::io::{DataWindow, Pixels};
@@ -21,6 +21,8 @@ pub struct Frame {
     layers: Vec<Option<Image>>,
     /// Edges in place of the cross that the layers hold.
     edges: Option<Edges>,
+    /// Light of groups of emitters, if it was recorded by itself.
+    pub lights: Vec<LightLayers>,
     /// Scene, seed, samples, version and so on.
     pub provenance: Provenance,
     /// The larger picture that the frame is a part of, if it is.
@@ -31,7 +33,7 @@ impl Frame {
     /// A frame without layers.
     pub fn new(width: usize, height: usize) -> Self {
         let layers = vec![None; Layer::COUNT];
-        Self { width, height, layers, edges: None, provenance: Provenance::default(), window: None }
+        Self { width, height, layers, edges: None, lights: Vec::new(), provenance: Provenance::default(), window: None }
     }
 
     /// A frame of several renders of one picture with different seeds, of `spp` samples a pixel each: their mean and its

@@ -13,6 +13,7 @@ pub mod exr;
 mod frame;
 mod joined;
 pub mod layer;
+mod light_layers;
 mod needs;
 mod neighbours;
 mod provenance;
@@ -25,10 +26,11 @@ mod tile;
 pub use self::edges::{Cross, EdgeParts, Edges, HalfEdge};
 pub use self::frame::{Frame, half};
 pub use self::layer::Layer;
+pub use self::light_layers::LightLayers;
 pub use self::needs::{EdgeNeed, Needs};
 pub use self::neighbours::{CROSS, Neighbours, STEPS, StepWeights, beside, opposite};
 pub use self::provenance::Provenance;
-pub use self::sample::{Differences, Features, Rejected, Sample, Scattering};
+pub use self::sample::{Differences, Features, GroupLight, Rejected, Sample, Scattering, Taken};
 pub use self::statistic::bin_count;
 pub use self::tile::Tile;
 
@@ -49,6 +51,8 @@ pub struct Film {
     pub height: usize,
     /// Statistics that are recorded.
     pub needs: Needs,
+    /// Names of the groups of emitters whose light is recorded by itself.
+    pub lights: Vec<String>,
     kernel: Kernel,
     tiles: Vec<Tile>,
 }
@@ -69,12 +73,19 @@ impl Film {
     /// An empty film.
     pub fn new(width: usize, height: usize, needs: Needs) -> Self {
         let tiles = Tile::all((width, height), needs, &Kernel::Cross).collect();
-        Self { width, height, needs, kernel: Kernel::Cross, tiles }
+        Self { width, height, needs, lights: Vec::new(), kernel: Kernel::Cross, tiles }
+    }
+
+    /// The film with the names of its groups of emitters.
+    #[must_use]
+    pub fn with_lights(self, names: &[String]) -> Self {
+        assert_eq!(names.len(), usize::from(self.needs.lights), "names of other groups of emitters");
+        Self { lights: names.to_vec(), ..self }
     }
 
     /// A film of all its tiles.
     pub(crate) fn of_tiles((width, height): (usize, usize), needs: Needs, kernel: Kernel, tiles: Vec<Tile>) -> Self {
-        Self { width, height, needs, kernel, tiles }
+        Self { width, height, needs, lights: Vec::new(), kernel, tiles }
     }
 
     /// The film without half-edges, which are recorded from when its neighbours are chosen.
@@ -175,7 +186,7 @@ mod tests {
     fn add(film: &mut Film, pixel: usize, i: u32, shifted: bool) {
         let edges = [Rgb::splat(sample(i).features.depth); 4];
         let differences = Some(Differences { color: &edges, ambient: &edges }).filter(|_| shifted);
-        film.tiles_mut()[0].add(pixel, &sample(i), differences).unwrap();
+        film.tiles_mut()[0].add(pixel, Taken { differences, ..Taken::alone(&sample(i)) }).unwrap();
     }
 
     #[test]
@@ -219,8 +230,8 @@ mod tests {
     fn samples_that_are_not_finite_count_as_zero_and_are_reported() {
         let mut film = Film::new(2, 1, Needs::ALL);
         let bad = Sample { color: vec3(f32::NAN, 1.0, 1.0), ..sample(0) };
-        assert!(film.tiles_mut()[0].add(1, &bad, None).is_err());
-        film.tiles_mut()[0].add(1, &Sample { color: Rgb::ONE, ..sample(0) }, None).unwrap();
+        assert!(film.tiles_mut()[0].add(1, Taken::alone(&bad)).is_err());
+        film.tiles_mut()[0].add(1, Taken::alone(&Sample { color: Rgb::ONE, ..sample(0) })).unwrap();
         assert_eq!((film.rejected(), film.samples()), (1, 2));
         assert_eq!(film.develop().get(Layer::Color).unwrap().pixel(1, 0), [0.5; 3]);
     }

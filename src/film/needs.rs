@@ -24,6 +24,9 @@ pub struct Needs {
     /// Share of every pixel that is covered.
     #[serde(default)]
     pub alpha: bool,
+    /// Number of groups of emitters whose light is recorded by itself.
+    #[serde(default)]
+    pub lights: u8,
 }
 
 /// How a film gets the differences between pixels.
@@ -54,7 +57,7 @@ impl EdgeNeed {
 }
 
 impl Needs {
-    /// Everything that can be recorded.
+    /// Everything that can be recorded of a scene without groups of emitters.
     pub const ALL: Self = Self {
         features: true,
         edges: EdgeNeed::Sampled,
@@ -63,6 +66,7 @@ impl Needs {
         position: true,
         ambient: true,
         alpha: true,
+        lights: 0,
     };
 
     /// Colour alone.
@@ -74,6 +78,7 @@ impl Needs {
         position: false,
         ambient: false,
         alpha: false,
+        lights: 0,
     };
 
     /// Colour and sampled edges.
@@ -84,7 +89,10 @@ impl Needs {
     pub fn bytes_per_pixel(self) -> usize {
         let counts = size_of::<u32>() * (1 + usize::from(self.edges.is_sampled()));
         let recorded = STATISTICS.iter().filter(|statistic| (statistic.recorded)(self) && statistic.sparse.is_none());
-        counts + recorded.map(|statistic| size_of::<f32>() * statistic.span(0, &CROSS).len()).sum::<usize>()
+        counts
+            + recorded
+                .map(|statistic| size_of::<f32>() * statistic.span(0, &CROSS, usize::from(self.lights)).len())
+                .sum::<usize>()
     }
 
     /// The same, with sampled differences in every sample.
@@ -108,6 +116,7 @@ impl Needs {
             position: self.position || other.position,
             ambient: self.ambient || other.ambient,
             alpha: self.alpha || other.alpha,
+            lights: self.lights.max(other.lights),
         }
     }
 }

@@ -94,6 +94,56 @@ pub struct Sample {
     pub alpha: f32,
 }
 
+/// The light of one group of emitters in a sample.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct GroupLight {
+    /// Its share of the scattered radiance.
+    pub color: Rgb,
+    /// Its share of the directly seen one.
+    pub direct: Rgb,
+}
+
+impl GroupLight {
+    /// Both as one vector.
+    pub(super) fn values(self) -> [f32; 6] {
+        let (color, direct) = (self.color, self.direct);
+        [color.x, color.y, color.z, direct.x, direct.y, direct.z]
+    }
+}
+
+/// A sample with everything that came along.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Taken<'a> {
+    /// The sample.
+    pub sample: &'a Sample,
+    /// Its differences, if the path was shifted.
+    pub differences: Option<Differences<'a>>,
+    /// Light of every group of emitters; none where it is not recorded.
+    pub lights: &'a [GroupLight],
+}
+
+impl<'a> Taken<'a> {
+    /// A sample by itself.
+    pub fn alone(sample: &'a Sample) -> Self {
+        Self { sample, differences: None, lights: &[] }
+    }
+
+    /// Differences of the scattered radiance.
+    pub(super) fn colors(&self) -> &'a [Rgb] {
+        self.differences.map_or(&[], |differences| differences.color)
+    }
+
+    /// Differences of the ambient light.
+    pub(super) fn ambients(&self) -> &'a [Rgb] {
+        self.differences.map_or(&[], |differences| differences.ambient)
+    }
+
+    /// Fails on NaN, on infinities and on values whose variance would overflow.
+    pub(super) fn check(&self) -> Result<(), Rejected> {
+        self.sample.check(self.differences.unwrap_or(Differences::NONE))
+    }
+}
+
 /// The reason for counting a sample as zero: the part of it that is not finite, or too large to be squared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rejected(

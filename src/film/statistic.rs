@@ -3,7 +3,7 @@
 
 use std::ops::Range;
 
-use super::{BINS, Differences, EdgeNeed, Needs, Sample};
+use super::{BINS, EdgeNeed, Needs, Sample, Taken};
 use crate::math::Rgb;
 
 /// Rows of [`STATISTICS`].
@@ -22,20 +22,24 @@ pub(super) enum Record {
     AmbientBins,
     AmbientEdgeBins,
     Alpha,
+    /// Scattered and directly seen light of every group of emitters.
+    Lights,
 }
 
 /// A statistic of every pixel.
 pub(super) struct Statistic {
-    /// Number of values in a sample, or of a half-edge.
+    /// Number of values in a sample, of a half-edge, or of a group of emitters.
     values: usize,
     pub kind: Kind,
     /// Whether it has values of every half-edge, and counts the samples with differences instead of all samples.
     pub of_edges: bool,
+    /// Whether it has values of every group of emitters.
+    of_lights: bool,
     /// If set, the statistic takes no memory in a tile until it says that a sample has a value other than zero.
     pub sparse: Option<fn(&Sample) -> bool>,
     /// Whether a film with these needs has it.
     pub recorded: fn(Needs) -> bool,
-    accumulate: fn(Slot, &Sample, Differences),
+    accumulate: fn(Slot, Taken),
 }
 
 /// How samples are accumulated.
@@ -47,11 +51,11 @@ pub(super) enum Kind {
     Bins,
 }
 
-const fn moments(values: usize, recorded: fn(Needs) -> bool, accumulate: fn(Slot, &Sample, Differences)) -> Statistic {
-    Statistic { values, kind: Kind::Moments, of_edges: false, sparse: None, recorded, accumulate }
+const fn moments(values: usize, recorded: fn(Needs) -> bool, accumulate: fn(Slot, Taken)) -> Statistic {
+    Statistic { values, kind: Kind::Moments, of_edges: false, of_lights: false, sparse: None, recorded, accumulate }
 }
 
-const fn bins(values: usize, recorded: fn(Needs) -> bool, accumulate: fn(Slot, &Sample, Differences)) -> Statistic {
+const fn bins(values: usize, recorded: fn(Needs) -> bool, accumulate: fn(Slot, Taken)) -> Statistic {
     Statistic { kind: Kind::Bins, ..moments(values, recorded, accumulate) }
 }
 
@@ -60,30 +64,43 @@ const fn of_edges(statistic: Statistic) -> Statistic {
 }
 
 /// Every statistic, in the order of [`Record`] and of checkpoint files.
-pub(super) const STATISTICS: [Statistic; 11] = [
-    moments(3, |_| true, |slot, sample, _| slot.add(sample.color.to_array())),
+pub(super) const STATISTICS: [Statistic; 12] = [
+    moments(3, |_| true, |slot, taken| slot.add(taken.sample.color.to_array())),
     Statistic {
         sparse: Some(|sample| sample.direct != Rgb::ZERO),
-        ..moments(3, |_| true, |slot, sample, _| slot.add(sample.direct.to_array()))
+        ..moments(3, |_| true, |slot, taken| slot.add(taken.sample.direct.to_array()))
     },
-    moments(7, |needs| needs.features, |slot, sample, _| slot.add(sample.features.surface())),
-    moments(1, |needs| needs.occlusion, |slot, sample, _| slot.add([sample.features.occlusion])),
-    moments(3, |needs| needs.position, |slot, sample, _| slot.add(sample.features.position.to_array())),
-    of_edges(moments(3, |needs| needs.edges.is_sampled(), |slot, _, differences| slot.add_colors(differences.color))),
-    bins(3, |needs| needs.bins, |slot, sample, _| slot.add_to_bin(sample.color.to_array())),
+    moments(7, |needs| needs.features, |slot, taken| slot.add(taken.sample.features.surface())),
+    moments(1, |needs| needs.occlusion, |slot, taken| slot.add([taken.sample.features.occlusion])),
+    moments(3, |needs| needs.position, |slot, taken| slot.add(taken.sample.features.position.to_array())),
+    of_edges(moments(3, |needs| needs.edges.is_sampled(), |slot, taken| slot.add_colors(taken.colors()))),
+    bins(3, |needs| needs.bins, |slot, taken| slot.add_to_bin(taken.sample.color.to_array())),
     of_edges(bins(
         3,
         |needs| needs.bins && needs.edges.is_sampled(),
-        |slot, _, differences| slot.add_colors_to_bin(differences.color),
+        |slot, taken| slot.add_colors_to_bin(taken.colors()),
     )),
-    bins(3, |needs| needs.ambient, |slot, sample, _| slot.add_to_bin(sample.ambient.to_array())),
+    bins(3, |needs| needs.ambient, |slot, taken| slot.add_to_bin(taken.sample.ambient.to_array())),
     of_edges(bins(
         3,
         |needs| needs.ambient && needs.edges.is_sampled(),
-        |slot, _, differences| slot.add_colors_to_bin(differences.ambient),
+        |slot, taken| slot.add_colors_to_bin(taken.ambients()),
     )),
-    moments(1, |needs| needs.alpha, |slot, sample, _| slot.add([sample.alpha])),
+    moments(1, |needs| needs.alpha, |slot, taken| slot.add([taken.sample.alpha])),
+    Statistic {
+        of_lights: true,
+        ..moments(
+            LIGHT,
+            |needs| needs.lights > 0,
+            |slot, taken| {
+                slot.add_all(LIGHT * taken.lights.len(), taken.lights.iter().flat_map(|light| light.values()));
+            },
+        )
+    },
 ];
+
+/// Values of a group of emitters: three of its scattered light, then three of what is directly seen.
+pub(super) const LIGHT: usize = 6;
 
 /// Position of a sample among those of its pixel, as the weights that means are updated with.
 #[derive(Clone, Copy)]
@@ -172,9 +189,10 @@ impl Statistic {
         }
     }
 
-    /// The floats of pixel `index`, which has the given ones among the half-edges of its tile, in a plane.
-    pub fn span(&self, index: usize, half_edges: &Range<usize>) -> Range<usize> {
-        let first = self.values * self.floats();
+    /// The floats of pixel `index`, which has the given ones among the half-edges of its tile, in a plane of a film with so many
+    /// groups of emitters.
+    pub fn span(&self, index: usize, half_edges: &Range<usize>, lights: usize) -> Range<usize> {
+        let first = self.values * self.floats() * if self.of_lights { lights } else { 1 };
         if self.of_edges {
             first * half_edges.start..first * half_edges.end
         } else {
@@ -183,8 +201,8 @@ impl Statistic {
     }
 
     /// Adds a sample to the floats of a pixel.
-    pub fn add(&self, values: &mut [f32], ordinal: Ordinal, sample: &Sample, differences: Differences) {
-        (self.accumulate)(Slot { values, ordinal }, sample, differences);
+    pub fn add(&self, values: &mut [f32], ordinal: Ordinal, taken: Taken) {
+        (self.accumulate)(Slot { values, ordinal }, taken);
     }
 
     /// Adds the `m` samples of `other` to the `n` samples of `mine`, as if they had been taken after them.
@@ -280,6 +298,7 @@ mod tests {
             (Record::AmbientBins, 3),
             (Record::AmbientEdgeBins, 3),
             (Record::Alpha, 1),
+            (Record::Lights, LIGHT),
         ];
         assert_eq!(names.len(), STATISTICS.len());
         for (k, (record, values)) in names.into_iter().enumerate() {

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::statistic::{Ordinal, STATISTICS, Statistic};
-use super::{Differences, Kernel, Needs, Neighbours, Rejected, Sample, TILE};
+use super::{Differences, GroupLight, Kernel, Needs, Neighbours, Rejected, Sample, TILE, Taken};
 
 /// The half-edges of the first pixel of a tile where every pixel has the four of the cross.
 pub(super) const CROSS: Range<usize> = 0..4;
@@ -19,6 +19,8 @@ pub struct Tile {
     pub width: usize,
     /// Number of rows.
     pub height: usize,
+    /// Number of groups of emitters.
+    lights: usize,
     /// Samples of every pixel.
     pub(super) counts: Vec<u32>,
     /// Samples of every pixel that came with differences; empty when edges are not recorded.
@@ -38,7 +40,8 @@ impl Tile {
         let edge_counts = vec![0; if needs.edges.is_sampled() { pixels } else { 0 }];
         let (counts, rejected, half_edges) = (vec![0; pixels], Vec::new(), Vec::new());
         let planes = STATISTICS.each_ref().map(|_| Vec::new());
-        let mut tile = Self { x, y, width, height, counts, edge_counts, rejected, half_edges, planes };
+        let lights = usize::from(needs.lights);
+        let mut tile = Self { x, y, width, height, lights, counts, edge_counts, rejected, half_edges, planes };
         for (k, statistic) in STATISTICS.iter().enumerate() {
             if (statistic.recorded)(needs) && statistic.sparse.is_none() {
                 tile.planes[k] = vec![0.0; tile.floats(statistic)];
@@ -92,7 +95,7 @@ impl Tile {
             Some(starts) => starts[0] as usize..starts[1] as usize,
             None => CROSS.end * index..CROSS.end * (index + 1),
         };
-        statistic.span(index, &half_edges)
+        statistic.span(index, &half_edges, self.lights)
     }
 
     /// Number of samples of pixel `index`, which is the number of its next sample.
@@ -122,35 +125,36 @@ impl Tile {
 
     /// Adds a sample to pixel `index`, with its differences if the path was shifted: one that was not leaves the counts of edges
     /// alone. A sample that is not finite is counted as zero, and reported.
-    pub fn add(&mut self, index: usize, sample: &Sample, differences: Option<Differences>) -> Result<(), Rejected> {
-        let outcome = sample.check(differences.unwrap_or(Differences::NONE));
+    pub fn add(&mut self, index: usize, taken: Taken) -> Result<(), Rejected> {
+        let outcome = taken.check();
         if outcome.is_err() {
             self.rejected.resize(self.counts.len(), 0);
             self.rejected[index] += 1;
-            self.accumulate(index, &Sample::default(), differences.map(Differences::zeroed));
+            let (differences, lights) =
+                (taken.differences.map(Differences::zeroed), vec![GroupLight::default(); taken.lights.len()]);
+            self.accumulate(index, Taken { sample: &Sample::default(), differences, lights: &lights });
         } else {
-            self.accumulate(index, sample, differences);
+            self.accumulate(index, taken);
         }
         outcome
     }
 
-    fn accumulate(&mut self, index: usize, sample: &Sample, differences: Option<Differences>) {
+    fn accumulate(&mut self, index: usize, taken: Taken) {
         let ordinals = [false, true].map(|of_edges| Ordinal::after(self.count_of(of_edges, index)));
         for (k, statistic) in STATISTICS.iter().enumerate() {
             if self.planes[k].is_empty() {
-                if !statistic.sparse.is_some_and(|nonzero| nonzero(sample)) {
+                if !statistic.sparse.is_some_and(|nonzero| nonzero(taken.sample)) {
                     continue;
                 }
                 self.planes[k] = vec![0.0; self.floats(statistic)];
             }
-            if !statistic.of_edges || differences.is_some() {
+            if !statistic.of_edges || taken.differences.is_some() {
                 let (span, ordinal) = (self.span(statistic, index), ordinals[usize::from(statistic.of_edges)]);
-                let differences = differences.unwrap_or(Differences::NONE);
-                statistic.add(&mut self.planes[k][span], ordinal, sample, differences);
+                statistic.add(&mut self.planes[k][span], ordinal, taken);
             }
         }
         self.counts[index] += 1;
-        if let (Some(count), true) = (self.edge_counts.get_mut(index), differences.is_some()) {
+        if let (Some(count), true) = (self.edge_counts.get_mut(index), taken.differences.is_some()) {
             *count += 1;
         }
     }

@@ -56,6 +56,11 @@ pub fn read(path: &Path, attributes: &[&str]) -> Result<Pixels> {
     ImageFile::open(path)?.pixels(attributes)
 }
 
+/// Whether the format of the path's extension holds layers besides the colours.
+pub fn has_layers(path: &Path) -> bool {
+    extension(path) == "exr"
+}
+
 /// Writes an image in the format of the path's extension, whole or not at all.
 pub fn write(path: &Path, pixels: &Pixels, kind: Kind, compression: Option<&str>) -> Result<()> {
     files::replace(path, |part| library::write(part, pixels, kind, compression))
@@ -66,7 +71,7 @@ pub fn write(path: &Path, pixels: &Pixels, kind: Kind, compression: Option<&str>
 pub fn write_color(path: &Path, image: &Image, extras: &Extras) -> Result<()> {
     check_writable(path)?;
     let extension = extension(path);
-    let (encoded, exr) = (ENCODED.contains(&extension.as_str()), extension == "exr");
+    let (encoded, exr) = (ENCODED.contains(&extension.as_str()), has_layers(path));
     let alpha = extras.alpha.filter(|_| WITH_ALPHA.contains(&extension.as_str()));
     let layers = if exr { extras.layers.as_slice() } else { &[] };
     let mut channels = ["R", "G", "B"].map(String::from).to_vec();

@@ -14,6 +14,7 @@ mod inputs;
 mod l1;
 mod l2;
 mod least_trimmed;
+mod lights;
 mod net;
 mod nfor;
 mod nlm;
@@ -23,10 +24,12 @@ mod primal;
 mod rdfc;
 mod residual;
 
+pub use self::lights::groups as light_groups;
 pub use self::parameters::Parameters;
 use crate::error::{Error, Result};
 use crate::film::{Frame, Layer, Needs};
 use crate::image::Image;
+use crate::image::planes::Planes;
 
 /// The result of a reconstruction.
 #[derive(Clone, Debug)]
@@ -92,6 +95,12 @@ pub trait Reconstruction: Send + Sync {
     /// A quicker method with much the same error, if there is one: it serves between passes of adaptive sampling.
     fn guide(&self) -> Option<&dyn Reconstruction> {
         None
+    }
+
+    /// Shares of the scattered radiance, filtered by the weights that the method filters the colours by; none where it has no such
+    /// weights.
+    fn filter(&self, _frame: &Frame, _shares: &Planes) -> Result<Option<Planes>> {
+        Ok(None)
     }
 
     /// The image without directly seen emitters, which [`solve`] adds.

@@ -7,6 +7,7 @@ use super::{Context, Method, Parameter, Parameters, Reconstruction, Solution, Tr
 use crate::error::Result;
 use crate::film::{Frame, Needs};
 use crate::image::nl_means::{self, Guides, NlmSettings};
+use crate::image::planes::Planes;
 
 /// `nlm`.
 pub const METHOD: Method = Method {
@@ -33,13 +34,14 @@ const BYTES: u64 = 250;
 const FEATURE: f32 = 0.6;
 
 fn make(parameters: &Parameters) -> Result<Box<dyn Reconstruction>> {
+    let features = parameters.switch("features")?;
     Ok(Box::new(Nlm {
-        features: parameters.switch("features")?,
+        features,
         settings: NlmSettings {
             window: parameters.get("window", "a number from 1 to 12", |window| (1..=12).contains(window))?,
             patch: parameters.get("patch", "a number from 0 to 4", |patch| (0..=4).contains(patch))?,
             color: parameters.get("k", "a number in [0.01, 100]", |k| (0.01..=100.0).contains(k))?,
-            feature: None,
+            feature: features.then_some(FEATURE),
         },
     }))
 }
@@ -49,25 +51,35 @@ struct Nlm {
     settings: NlmSettings,
 }
 
+impl Nlm {
+    /// The images that pixels are compared by.
+    fn guides(&self, inputs: &Inputs) -> Result<Guides> {
+        let mut features = Vec::new();
+        if self.features {
+            for kind in [Kind::Albedo, Kind::Normal] {
+                features.push(Feature::of(kind, inputs)?.guide());
+            }
+        }
+        Ok(Guides { color: inputs.guide()?, features })
+    }
+}
+
 impl Reconstruction for Nlm {
     fn needs(&self) -> Needs {
         Needs { features: self.features, ..Needs::default() }
     }
 
+    fn filter(&self, frame: &Frame, shares: &Planes) -> Result<Option<Planes>> {
+        Ok(Some(nl_means::filter(shares, &self.guides(&Inputs::new(frame, 1)?)?, self.settings)))
+    }
+
     fn reconstruct(&self, frame: &Frame, context: &Context) -> Result<Solution> {
         let inputs = Inputs::new(frame, 1)?;
         check_memory(frame, context, METHOD.id, BYTES)?;
-        let mut features = Vec::new();
-        if self.features {
-            for kind in [Kind::Albedo, Kind::Normal] {
-                features.push(Feature::of(kind, &inputs)?.guide());
-            }
-        }
-        let settings = NlmSettings { feature: self.features.then_some(FEATURE), ..self.settings };
-        let guides = Guides { color: inputs.guide()?, features };
+        let guides = self.guides(&inputs)?;
         let alpha = inputs.alpha()?;
         let values = alpha.as_ref().map(|alpha| guides.color.mean.clone().and(alpha));
-        let filtered = nl_means::filter(values.as_ref().unwrap_or(&guides.color.mean), &guides, settings);
+        let filtered = nl_means::filter(values.as_ref().unwrap_or(&guides.color.mean), &guides, self.settings);
         let image = filtered.part(0, 3).to_image(frame.width, frame.height, 1.0 / inputs.scale);
         let alpha = alpha.map(|_| inputs.clamp_alpha(filtered.part(3, 1).to_image(frame.width, frame.height, 1.0)));
         let alpha = alpha.transpose()?;

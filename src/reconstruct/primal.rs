@@ -3,6 +3,7 @@
 use super::{Context, Method, Reconstruction, Solution, Traits};
 use crate::error::Result;
 use crate::film::{Frame, Layer, Needs};
+use crate::image::planes::Planes;
 
 /// `primal`.
 pub const METHOD: Method = Method {
@@ -22,6 +23,10 @@ impl Reconstruction for Primal {
 
     fn estimates_error(&self) -> bool {
         true
+    }
+
+    fn filter(&self, _frame: &Frame, shares: &Planes) -> Result<Option<Planes>> {
+        Ok(Some(shares.clone()))
     }
 
     fn reconstruct(&self, frame: &Frame, _context: &Context) -> Result<Solution> {

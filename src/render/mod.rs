@@ -14,6 +14,7 @@ mod direct;
 mod emission;
 mod features;
 pub mod gradient;
+mod group_lights;
 mod half_edges;
 mod outcome;
 mod paths;

@@ -38,7 +38,8 @@ pub(crate) struct Choices {
 impl RenderOutcome {
     /// An empty film.
     pub fn new(scene: &Scene, needs: Needs) -> Self {
-        Self::of(Film::new(scene.sensor().width, scene.sensor().height, needs))
+        let film = Film::new(scene.sensor().width, scene.sensor().height, needs);
+        Self::of(if needs.lights > 0 { film.with_lights(scene.light_groups().names()) } else { film })
     }
 
     /// A film with its samples, as if no time had been spent on it.

@@ -3,6 +3,7 @@
 use super::continuation::Shaded;
 use super::emission::{self, EmitterHit};
 use super::features::{self, FeatureWalk};
+use super::group_lights::GroupLights;
 use super::paths::Packet;
 use super::thinning::Work;
 use super::vertices::{Emission, Vertices};
@@ -20,6 +21,8 @@ pub struct PathRecord {
     pub packets: Vec<usize>,
     /// Contributions and features so far, one sample for each path.
     pub samples: Vec<Sample>,
+    /// The contributions of groups of emitters, if they are asked for.
+    pub lights: GroupLights,
     /// Number of leading vertices of every path up to the last one that receives light.
     pub lit_length: Vec<u32>,
     /// Work of the latest wave.
@@ -28,8 +31,8 @@ pub struct PathRecord {
 }
 
 impl PathRecord {
-    /// Starts a wave of `count` paths.
-    pub fn start(&mut self, count: usize) {
+    /// Starts a wave of `count` paths, with so many groups of emitters.
+    pub fn start(&mut self, count: usize, groups: usize) {
         fn reset<T: Default + Clone>(list: &mut Vec<T>, count: usize) {
             list.clear();
             list.resize(count, T::default());
@@ -37,6 +40,7 @@ impl PathRecord {
         reset(&mut self.samples, count);
         reset(&mut self.lit_length, count);
         reset(&mut self.walks, count);
+        self.lights.start(count, groups);
         self.packets.clear();
         self.work = Work::default();
     }
@@ -63,6 +67,7 @@ impl PathRecord {
             if depth == 0 {
                 let hidden = scene.integrator().hide_emitters;
                 self.samples[id].direct = if hidden { Rgb::ZERO } else { found.radiance };
+                self.lights.add_direct(scene, id, (found.point.emitter, self.samples[id].direct));
                 continue;
             }
             // Through holes the camera sees the environment as it sees it beside them.
@@ -70,6 +75,7 @@ impl PathRecord {
                 continue;
             }
             self.samples[id].color += found.color;
+            self.lights.add(scene, id, (found.point.emitter, found.color));
             self.lit_length[id] = depth;
             if let Some(level) = recorded {
                 let parent = packet.parent.0[lane] as usize;
@@ -114,10 +120,11 @@ impl PathRecord {
     }
 
     /// Adds the direct light of some vertices, from next-event estimation, to the colour.
-    pub fn add_direct(&mut self, depth: u32, vertices: &Vertices, shaded: &Shaded) {
+    pub fn add_direct(&mut self, scene: &Scene, depth: u32, vertices: &Vertices, shaded: &Shaded) {
         for lane in vertices.lit.lanes() {
-            let id = vertices.id.0[lane] as usize;
-            self.samples[id].color += shaded.color.get(lane);
+            let (id, color) = (vertices.id.0[lane] as usize, shaded.color.get(lane));
+            self.samples[id].color += color;
+            self.lights.add(scene, id, (vertices.light.points.emitter(lane), color));
             self.lit_length[id] = depth + 1;
         }
         for lane in shaded.non_finite.lanes() {

@@ -136,7 +136,7 @@ fn run_round(scene: &Scene, settings: RenderSettings, control: &Control, outcome
 
 /// A film like another one without samples, at the beginning of its pilot.
 fn empty(film: &Film, settings: RenderSettings) -> Film {
-    let mut made = Film::new(film.width, film.height, film.needs);
+    let mut made = Film::new(film.width, film.height, film.needs).with_lights(&film.lights);
     match settings.kernel.known((film.width, film.height), settings.shift.is_one_sided()) {
         Some(neighbours) => {
             made.choose(neighbours);
@@ -301,7 +301,7 @@ fn run_tile(
             sink.put(&WaveSamples { number: index, film, pixels: &pixels, samples: &samples });
         }
         for (k, (&pixel, &(x, y))) in numbers.iter().zip(&pixels).enumerate() {
-            if let Err(reason) = tile.add(pixel, &samples.all[k], samples.differences(k)) {
+            if let Err(reason) = tile.add(pixel, samples.taken(k)) {
                 first_rejected
                     .get_or_insert((SampleId { seed: settings.seed, x, y, index: settings.first + index }, reason));
             }

@@ -2,7 +2,7 @@
 //! most of the error would be theirs, and such rays end at the first surface.
 
 use super::camera::CameraSamples;
-use crate::film::Sample;
+use super::record::PathRecord;
 use crate::math::lanes::{Bits, LANES, Lanes, Mask};
 use crate::math::{Rgb, luminance};
 use crate::scene::packet::Surfaces;
@@ -37,7 +37,7 @@ pub fn grids(scene: &Scene, pixels: &[(usize, usize)]) -> Vec<u32> {
         (0..pixels.len()).flat_map(|pixel| (0..per_pixel).map(move |cell| (pixel, PROBES, cell))).collect();
     let mut moments = vec![[0.0f32; 2]; pixels.len()];
     let mut surfaces = Surfaces::default();
-    look(scene, &camera, &cells, &mut surfaces, |(pixel, ..), radiance| {
+    look(scene, &camera, &cells, &mut surfaces, |(pixel, ..), radiance, _| {
         let value = luminance(radiance);
         moments[pixel][0] += value / per_pixel as f32;
         moments[pixel][1] += value * value / per_pixel as f32;
@@ -63,22 +63,30 @@ pub fn grids(scene: &Scene, pixels: &[(usize, usize)]) -> Vec<u32> {
 
 /// Replaces the directly seen light of samples by the mean over a grid of cells, with a ray through each. `grids` has the
 /// number of cells along a side for every sample; one leaves it as it is.
-pub fn refine(scene: &Scene, camera: &CameraSamples, grids: &[u32], samples: &mut [Sample], surfaces: &mut Surfaces) {
+pub fn refine(scene: &Scene, camera: &CameraSamples, grids: &[u32], record: &mut PathRecord, surfaces: &mut Surfaces) {
+    let PathRecord { samples, lights, .. } = record;
     let refined = grids.iter().enumerate().filter(|&(_, &side)| side > 1);
     let cells: Vec<Cell> = refined.flat_map(|(i, &side)| (0..side * side).map(move |cell| (i, side, cell))).collect();
-    cells.iter().for_each(|&(i, ..)| samples[i].direct = Rgb::ZERO);
-    look(scene, camera, &cells, surfaces, |(i, side, _), radiance| {
-        samples[i].direct += radiance / (side * side) as f32;
+    for &(i, ..) in &cells {
+        samples[i].direct = Rgb::ZERO;
+        lights.clear_direct(i);
+    }
+    look(scene, camera, &cells, surfaces, |(i, side, _), radiance, shape| {
+        let share = radiance / (side * side) as f32;
+        samples[i].direct += share;
+        if let Some(emitter) = scene.emitter_at(shape) {
+            lights.add_direct(scene, i, (emitter, share));
+        }
     });
 }
 
-/// Traces a camera ray through a point of every cell; `see` takes the emitted radiance at its end.
+/// Traces a camera ray through a point of every cell; `see` takes the emitted radiance at its end, and the shape there.
 fn look(
     scene: &Scene,
     camera: &CameraSamples,
     cells: &[Cell],
     surfaces: &mut Surfaces,
-    mut see: impl FnMut(Cell, Rgb),
+    mut see: impl FnMut(Cell, Rgb, Option<u32>),
 ) {
     for packet in cells.chunks(LANES) {
         let (mut hashes, mut numbers) = (Bits::ZERO, Bits::ZERO);
@@ -99,6 +107,7 @@ fn look(
             scene.pass_emitters(&rays, &mut hit, surfaces);
         }
         let radiance = scene.seen_radiance(&rays, surfaces, (active, hit));
-        packet.iter().enumerate().for_each(|(lane, &cell)| see(cell, radiance.get(lane)));
+        let shape = |lane| hit.get(lane).then(|| surfaces.shape.0[lane]);
+        packet.iter().enumerate().for_each(|(lane, &cell)| see(cell, radiance.get(lane), shape(lane)));
     }
 }

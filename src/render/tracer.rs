@@ -40,7 +40,9 @@ impl<'a> PathTracer<'a> {
     }
 
     fn trace_from(&mut self, camera: &CameraSamples, steps: &[(i32, i32)], keep_all: bool, record: &mut PathRecord) {
-        record.start(camera.pixels.len());
+        // Neighbours' paths are there for the differences of all light.
+        let groups = if steps.is_empty() { self.needs.lights } else { 0 };
+        record.start(camera.pixels.len(), usize::from(groups));
         self.start(camera, steps);
         let mut depth = 0;
         while self.paths.len() > 0 {
@@ -102,7 +104,7 @@ impl<'a> PathTracer<'a> {
                 continue;
             }
             let shaded = shade((scene, &sampler), depth, packet, vertices, (k * LANES) as u32, next);
-            record.add_direct(depth, vertices, &shaded);
+            record.add_direct(scene, depth, vertices, &shaded);
             if needs.alpha || scene.integrator().hide_emitters {
                 record.cover(packet, vertices.hit & !vertices.passed);
             }

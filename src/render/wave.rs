@@ -8,7 +8,7 @@ use super::record::PathRecord;
 use super::seen;
 use super::thinning::Work;
 use super::tracer::PathTracer;
-use crate::film::{CROSS, Differences, Needs, Neighbours, Sample};
+use crate::film::{CROSS, Differences, GroupLight, Needs, Neighbours, Sample, Taken};
 use crate::math::lanes::LANES;
 use crate::math::vec2;
 use crate::scene::Scene;
@@ -31,11 +31,20 @@ pub struct Wave<'a> {
 pub struct Samples<'a> {
     /// The samples.
     pub all: &'a [Sample],
+    /// Light of every group of emitters in every sample, sample by sample.
+    lights: &'a [GroupLight],
     half_edges: Option<&'a HalfEdges>,
     slots: usize,
 }
 
 impl<'a> Samples<'a> {
+    /// A sample with everything that came along.
+    pub fn taken(&self, index: usize) -> Taken<'a> {
+        let groups = self.lights.len() / self.all.len();
+        let lights = &self.lights[groups * index..groups * (index + 1)];
+        Taken { sample: &self.all[index], differences: self.differences(index), lights }
+    }
+
     /// Half-edges of the pixel of the film that has the most, if paths were shifted.
     pub fn slots(&self) -> Option<usize> {
         self.half_edges.map(|_| self.slots)
@@ -86,7 +95,7 @@ impl<'a> Wave<'a> {
             shift.shift(&mut self.tracer, &camera, &mut self.record, &mut self.half_edges);
         }
         if grids.iter().any(|&side| side > 1) {
-            seen::refine(self.tracer.scene, &camera, grids, &mut self.record.samples, &mut self.surfaces);
+            seen::refine(self.tracer.scene, &camera, grids, &mut self.record, &mut self.surfaces);
         }
         if self.occlusion {
             for (first, samples) in self.record.samples.chunks_mut(LANES).enumerate() {
@@ -97,7 +106,9 @@ impl<'a> Wave<'a> {
                 }
             }
         }
-        Samples { all: &self.record.samples, half_edges: shifted.then_some(&self.half_edges), slots: self.slots }
+        let PathRecord { samples, lights, .. } = &self.record;
+        let half_edges = shifted.then_some(&self.half_edges);
+        Samples { all: samples, lights: lights.all(), half_edges, slots: self.slots }
     }
 
     /// Work of the latest wave.

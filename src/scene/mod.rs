@@ -5,6 +5,7 @@ pub mod accel;
 pub mod bsdf;
 pub mod closure;
 pub mod emitter;
+mod light_groups;
 pub mod load;
 pub mod packet;
 mod ray_log;
@@ -19,6 +20,7 @@ use std::sync::Arc;
 use self::accel::Accel;
 use self::bsdf::Bsdf;
 use self::emitter::{Choice, Emitter, LightPoint};
+pub use self::light_groups::LightGroups;
 use self::packet::{EmitterInfo, ShapeInfo};
 use self::sensor::{Sensor, SensorInfo};
 pub use self::shape::Bounds;
@@ -96,6 +98,8 @@ pub struct SceneDescription {
     pub groups: Vec<Group>,
     /// Emitters, in the order of the shapes' indices.
     pub emitters: Vec<Box<dyn Emitter>>,
+    /// Their ids, those of their shapes, or their types and lines.
+    pub emitter_names: Vec<Arc<str>>,
     /// The camera.
     pub sensor: Sensor,
     /// Path depths.
@@ -116,6 +120,8 @@ pub struct Scene {
     /// Shapes in world space, then those of the groups.
     shapes: Vec<Shape>,
     emitters: Vec<Box<dyn Emitter>>,
+    emitter_names: Vec<Arc<str>>,
+    light_groups: LightGroups,
     /// `None` when nothing emits.
     emitter_choice: Option<Choice>,
     /// Properties that packets use in place of virtual calls.
@@ -156,6 +162,8 @@ impl Scene {
             accel,
             shapes,
             emitters,
+            emitter_names: parts.emitter_names,
+            light_groups: LightGroups::default(),
             emitter_choice,
             shape_infos,
             emitter_infos,
@@ -232,6 +240,25 @@ impl Scene {
     /// A point of the environment in a direction, if there is one; its texture coordinates are left to the caller.
     pub fn far_point(&self, direction: Vec3) -> Option<LightPoint> {
         Some(LightPoint::at_infinity(direction, self.environment?))
+    }
+
+    /// Index of the emitter at the end of a ray, if there is one: the surface that it has hit if it has, else the environment.
+    pub fn emitter_at(&self, shape: Option<u32>) -> Option<u32> {
+        match shape {
+            Some(shape) => self.shapes[shape as usize].emitter,
+            None => self.environment,
+        }
+    }
+
+    /// Records the light of groups of emitters by themselves, from now on; [`LightGroups::parse`] has the form of the text.
+    pub fn group_lights(&mut self, text: &str) -> Result<()> {
+        self.light_groups = LightGroups::parse(text, &self.emitter_names)?;
+        Ok(())
+    }
+
+    /// Groups of emitters whose light is recorded by itself.
+    pub fn light_groups(&self) -> &LightGroups {
+        &self.light_groups
     }
 
     /// The camera.

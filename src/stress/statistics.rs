@@ -2,7 +2,7 @@
 
 use super::{Case, Checks};
 use crate::error::Result;
-use crate::film::{Differences, Film, Frame, Layer, Needs, Sample};
+use crate::film::{Differences, Film, Frame, Layer, Needs, Sample, Taken};
 use crate::math::Rgb;
 use crate::synthetic::random;
 
@@ -46,7 +46,7 @@ fn samples(checks: &mut Checks) -> Result<()> {
                 }
                 // Rejected or not: what is left must be numbers.
                 let differences = Differences { color: &edges, ambient: &[Rgb::ZERO; 4] };
-                let _ = film.tiles_mut()[0].add(0, &sample, Some(differences));
+                let _ = film.tiles_mut()[0].add(0, Taken { differences: Some(differences), ..Taken::alone(&sample) });
             }
             let frame = film.develop();
             let bad = frame.present().filter(|(_, image)| image.not_finite().is_some()).count();
@@ -65,7 +65,7 @@ fn many(checks: &mut Checks) -> Result<()> {
         for i in 0..count {
             let value = mean + spread * random(2, i);
             let sample = Sample { color: Rgb::splat(value), ..Sample::default() };
-            let _ = film.tiles_mut()[0].add(0, &sample, None);
+            let _ = film.tiles_mut()[0].add(0, Taken::alone(&sample));
             let apart = f64::from(value) - f64::from(mean);
             (sum, squares) = (sum + apart, squares + apart * apart);
         }
@@ -93,7 +93,7 @@ fn merge(checks: &mut Checks) -> Result<()> {
             let color = Rgb::splat(random(3, i));
             let differences = Differences { color: &[color; 4], ambient: &[Rgb::ZERO; 4] };
             let sample = Sample { color, direct: color * 2.0, ..Sample::default() };
-            let _ = film.tiles_mut()[0].add(0, &sample, Some(differences));
+            let _ = film.tiles_mut()[0].add(0, Taken { differences: Some(differences), ..Taken::alone(&sample) });
         }
         film
     };

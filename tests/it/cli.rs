@@ -79,7 +79,10 @@ fn figures_come_as_json_with_the_promised_keys() {
     assert!(stats["peak_bytes"].as_u64().unwrap() > 1 << 20);
     assert_eq!(stats["method"].as_str(), Some("net"));
     let plan = stats["plan"].as_str().unwrap();
-    assert!(plan.starts_with("+gradients +features -bins -occlusion -position -ambient -alpha -materials"), "{plan}");
+    assert!(
+        plan.starts_with("+gradients +features -bins -occlusion -position -ambient -alpha -lights -materials"),
+        "{plan}"
+    );
     let output =
         fluxion(folder.path()).args(["compare", "a.exr", "a.exr", "--json", "--map", "map.png"]).output().unwrap();
     let figures: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();

@@ -163,6 +163,7 @@ fn checkpoints() {
         needs: Needs::ALL,
         shift: Shift::default(),
         kernel: fluxion::neighbours::Selector::default(),
+        lights: Vec::new(),
         runs: vec![Run { seed: 1, first: 0, samples: 9 }],
     };
     checkpoint::save(&path, &origin, &outcome, None).unwrap();

@@ -33,6 +33,7 @@ fn origin(scene: &Scene, seed: u64, needs: Needs) -> Origin {
         needs,
         shift: Shift::default(),
         kernel: fluxion::neighbours::Selector::default(),
+        lights: Vec::new(),
         runs: vec![Run { seed, first: 0, samples: 0 }],
     }
 }

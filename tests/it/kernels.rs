@@ -170,6 +170,7 @@ fn check_interrupted(kernel: &str) {
         needs,
         shift: Shift::default(),
         kernel: settings(1).kernel,
+        lights: Vec::new(),
         runs: vec![Run { seed: 3, first: 0, samples: 0 }],
     };
     let straight = kernel_film(&scene, settings(11));

@@ -18,6 +18,7 @@ mod interruption;
 mod job;
 mod kernels;
 mod learned;
+mod light_groups;
 mod lights;
 mod loader;
 mod mattes;

@@ -172,6 +172,28 @@ fn a_missing_layer_is_named_with_the_way_to_get_it() {
 }
 
 #[test]
+fn any_layer_may_be_missing() {
+    let frame = noisy(13, 9, 1.0);
+    for method in reconstruct::METHODS.iter().filter(|method| method.id != "oidn") {
+        for (removed, _) in frame.present() {
+            let mut rest = Frame::new(frame.width, frame.height);
+            frame
+                .present()
+                .filter(|(layer, _)| *layer != removed)
+                .for_each(|(layer, image)| rest.set(layer, image.clone()));
+            // Either it is done without, or the error names it.
+            match run(method, &rest) {
+                Ok(image) => assert!(image.not_finite().is_none(), "{} without {removed:?}", method.id),
+                Err(Error::Missing { layer, .. }) => {
+                    assert_eq!(layer, removed.channel_names().join(", "), "{}", method.id)
+                }
+                Err(error) => panic!("{} without {removed:?}: {error}", method.id),
+            }
+        }
+    }
+}
+
+#[test]
 fn values_that_are_not_finite_are_errors_that_name_the_pixel() {
     for &method in METHODS.iter() {
         for poison in [f32::NAN, f32::INFINITY] {

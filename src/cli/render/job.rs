@@ -56,7 +56,7 @@ impl Job<'_> {
             if let Some(viewer) = self.viewer {
                 viewer.show(&solution.image);
             }
-            method::write(&args.method, &args.output, &solution, &frame, stats)?;
+            method::write((&args.method, self.method), &args.output, &solution, &frame, stats)?;
         }
         layers?;
         if let Some(path) = &args.cryptomatte {

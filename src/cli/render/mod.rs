@@ -94,6 +94,10 @@ pub struct Args {
     /// EXR file of Cryptomatte layers: shares of pixels by objects and materials, named by their ids in the scene file
     #[arg(long, value_name = "FILE")]
     cryptomatte: Option<PathBuf>,
+    /// Images of the light of groups of emitters by themselves, which add up to the colour, as layers `light.NAME` of exr images:
+    /// emitters by the patterns of their ids or those of their shapes, and a group without a pattern for all others
+    #[arg(long, value_name = "NAME=PATTERN,...,NAME")]
+    light_groups: Option<String>,
     /// Compute what scene, method and layers need, or everything, to see the savings
     #[arg(long, default_value = "needed", value_enum, value_name = "WHAT")]
     plan: Planned,
@@ -130,7 +134,11 @@ impl Args {
     fn load(&self) -> Result<Scene> {
         let texture_memory = self.texture_memory << 20;
         let options = load::Options { threads: self.threads, texture_memory, ..self.options.options() };
-        Ok(super::scene::load(&self.scene, &options)?)
+        let mut scene = super::scene::load(&self.scene, &options)?;
+        if let Some(groups) = &self.light_groups {
+            scene.group_lights(groups)?;
+        }
+        Ok(scene)
     }
 
     /// Limits of the render.
@@ -273,7 +281,7 @@ fn saved(args: &Args, needed: Needs) -> Needs {
             occlusion: args.occlusion,
             position: args.position,
             ambient: args.ambient,
-            alpha: false,
+            ..Needs::NONE
         },
     }
 }
@@ -302,6 +310,7 @@ fn origin(args: &Args, scene: &Scene, plan: &Plan, kernel: Selector) -> Result<O
         needs: plan.needs,
         shift: shift(args),
         kernel,
+        lights: scene.light_groups().names().to_vec(),
         runs: vec![Run { seed: args.seed, first: args.first, samples: 0 }],
     })
 }

@@ -112,7 +112,7 @@ fn error(halves: &[Planes; 2], filtered: &[Planes; 2], variance: &Planes) -> Pla
 }
 
 /// Albedo, normal and depth, each filtered by itself, the depth in units of the largest. Frames of other programs may have
-/// no depth.
+/// no depth, which is then the same everywhere.
 fn features(inputs: &Inputs) -> Result<Planes> {
     let depth = inputs.frame.get(Layer::Depth);
     let furthest = depth.map_or(0.0, |depth| depth.data.iter().copied().fold(1e-30, f32::max));
@@ -127,5 +127,6 @@ fn features(inputs: &Inputs) -> Result<Planes> {
         let clean = nl_means::clean(&Guide { mean, variance, tolerance: None }, 0.5);
         all = Some(all.map_or_else(|| clean.clone(), |all| all.and(&clean)));
     }
-    Ok(all.expect("there are two"))
+    let all = all.expect("there are two");
+    Ok(if depth.is_some() { all } else { all.and(&Planes::from_fn(inputs.width, inputs.height, 1, |_, _, _| 0.0)) })
 }

@@ -23,6 +23,8 @@ pub struct Contents {
     pub groups: Groups,
     /// Emitters, numbered as the shapes name them.
     pub emitters: Vec<Box<dyn Emitter>>,
+    /// Their ids, or those of their shapes.
+    pub emitter_names: Vec<Arc<str>>,
 }
 
 /// Shapes that are instanced together, with their bounding box.
@@ -55,6 +57,7 @@ impl Contents {
         object.ignore(&["sampling_weight"]);
         object.all_used(plugin.parameters)?;
         self.emitters.push(emitter);
+        self.emitter_names.push(name(object));
         Ok(())
     }
 
@@ -76,7 +79,10 @@ impl Contents {
                 let number = (self.shapes.len() as u32, self.emitters.len() as u32);
                 if let Some((shape, emitter)) = single(object, loader, number)? {
                     self.shapes.push(shape);
-                    self.emitters.extend(emitter);
+                    if let Some((emitter, name)) = emitter {
+                        self.emitters.push(emitter);
+                        self.emitter_names.push(name);
+                    }
                 }
                 Ok(())
             }
@@ -142,8 +148,8 @@ fn children(object: &Object, loader: &Loader) -> Result<Vec<Rc<Object>>> {
     Ok(found)
 }
 
-/// A shape with its emitter, if it is emissive.
-type Lit = (Shape, Option<Box<dyn Emitter>>);
+/// A shape with its emitter, if it is emissive, and that emitter's name.
+type Lit = (Shape, Option<(Box<dyn Emitter>, Arc<str>)>);
 
 /// A shape with its emitter, which will have the numbers given; none when it has no area.
 fn single(object: &Object, loader: &mut Loader, (shape_number, emitter_number): (u32, u32)) -> Result<Option<Lit>> {
@@ -161,7 +167,8 @@ fn single(object: &Object, loader: &mut Loader, (shape_number, emitter_number): 
                 return Err(nested.loc.invalid("a second emitter; a shape has one"));
             }
             "emitter" if nested.plugin == "area" => {
-                radiance = Some(loader.radiance(&nested, "radiance")?);
+                // An id of its own goes before that of the shape.
+                radiance = Some((loader.radiance(&nested, "radiance")?, nested.id.clone()));
                 nested.ignore(&["sampling_weight"]);
                 nested.all_used("radiance")?;
             }
@@ -178,9 +185,9 @@ fn single(object: &Object, loader: &mut Loader, (shape_number, emitter_number): 
     if geometry.area() <= 0.0 {
         return Ok(None);
     }
-    let emitter = radiance.map(|radiance| {
+    let emitter = radiance.map(|(radiance, id)| {
         let area = emitter::Area::new(Arc::clone(&geometry), radiance, shape_number);
-        Box::new(area) as Box<dyn Emitter>
+        (Box::new(area) as Box<dyn Emitter>, id.map_or_else(|| name(object), |id| id.as_str().into()))
     });
     let bsdf = bsdf.unwrap_or_else(|| bsdf::default(emitter.is_some()));
     let (name, number) = (name(object), emitter.as_ref().map(|_| emitter_number));

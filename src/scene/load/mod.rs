@@ -126,15 +126,25 @@ fn build(path: &Path, tree: xml::Tree, options: &Options) -> Result<Scene> {
         None => Sensor::default(),
     };
     let sensors = sensors.into_iter().map(|object| SensorInfo::new(object)).collect();
-    let Contents { shapes, groups, emitters } = contents;
+    let Contents { shapes, groups, emitters, emitter_names } = contents;
     let chosen = integrator::choose(&integrators, &mut loader)?;
     let integrator = Integrator { max_depth: options.max_depth.unwrap_or(chosen.max_depth), ..chosen };
     let groups = groups.into_values();
     let grouped = groups.iter().flat_map(|group| &group.shapes);
     let (attributes, files, warnings) = loader.finish();
     texture::bind(attributes, shapes.iter().chain(grouped).map(|shape| &shape.geometry))?;
-    let parts =
-        SceneDescription { shapes, groups, emitters, sensor, sensors, integrator, fingerprint, files, warnings };
+    let parts = SceneDescription {
+        shapes,
+        groups,
+        emitters,
+        emitter_names,
+        sensor,
+        sensors,
+        integrator,
+        fingerprint,
+        files,
+        warnings,
+    };
     Scene::build(parts, options.threads).map_err(|error| match error {
         Error::BadData(what) => loc.invalid(what),
         other => other,

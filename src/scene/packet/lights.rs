@@ -77,6 +77,11 @@ impl Lights {
         self.envmap_radiance.set(lane, radiance);
     }
 
+    /// The emitter of one lane's point.
+    pub fn emitter(&self, lane: usize) -> u32 {
+        self.emitter.0[lane]
+    }
+
     /// The point of one lane; of the environment image only its direction.
     pub fn get(&self, lane: usize) -> LightPoint {
         if !self.uniform_mesh.get(lane) {

@@ -1,0 +1,56 @@
+//! The light of groups of emitters in a reconstructed image: pixel by pixel it is shared among the groups as their own light is,
+//! filtered by one set of weights, so that the groups add up to the image whatever the method.
+
+use super::inputs::Inputs;
+use super::{Note, Reconstruction, Solution, parse};
+use crate::error::Result;
+use crate::film::{Frame, Layer, LightLayers};
+use crate::image::Image;
+
+/// Method whose weights filter the groups' light where a method has none of its own.
+const FILTER: &str = "nlm";
+const WITHOUT_FEATURES: &str = "nlm:features=off";
+
+/// Images of all groups, in radiance, directly seen emitters included. They add up to the solution's image.
+pub fn groups(method: &dyn Reconstruction, frame: &Frame, solution: &Solution) -> Result<Vec<Note>> {
+    let Some(first) = frame.lights.first() else { return Ok(Vec::new()) };
+    let inputs = Inputs::new(frame, 1)?;
+    let planes = |lights: &LightLayers| inputs.mirrored(&lights.color, inputs.scale);
+    let all = frame.lights[1..].iter().fold(planes(first), |all, lights| all.and(&planes(lights)));
+    let filtered = match method.filter(frame, &all)? {
+        Some(filtered) => filtered,
+        None => {
+            let features = frame.get(Layer::Albedo).and(frame.get(Layer::Normal)).is_some();
+            let filter = parse(if features { FILTER } else { WITHOUT_FEATURES })?;
+            filter.filter(frame, &all)?.unwrap_or(all)
+        }
+    };
+    let filtered: Vec<_> = (0..frame.lights.len())
+        .map(|k| filtered.part(3 * k, 3).to_image(frame.width, frame.height, 1.0 / inputs.scale))
+        .collect();
+    let mut notes: Vec<_> =
+        frame.lights.iter().map(|lights| Note { name: lights.name.clone(), image: lights.direct.clone() }).collect();
+    for (i, &value) in solution.image.data.iter().enumerate() {
+        let scattered = value - frame.get(Layer::Direct).map_or(0.0, |direct| direct.data[i]);
+        let shares = shares(&filtered, i);
+        notes.iter_mut().zip(shares).for_each(|(note, share)| note.image.data[i] += scattered * share);
+    }
+    Ok(notes)
+}
+
+/// Shares of the groups in a value, which add up to one: those of its channel, of all channels where that is black, or equal ones.
+fn shares(filtered: &[Image], i: usize) -> impl Iterator<Item = f32> {
+    let pixel = i / 3 * 3..i / 3 * 3 + 3;
+    let sum = |range: std::ops::Range<usize>| {
+        filtered.iter().map(|image| image.data[range.clone()].iter().map(|&value| f64::from(value)).sum::<f64>()).sum()
+    };
+    let (range, total): (_, f64) = match (sum(i..i + 1), sum(pixel.clone())) {
+        (of_channel, _) if of_channel > 0.0 => (i..i + 1, of_channel),
+        (_, of_pixel) => (pixel, of_pixel),
+    };
+    let count = filtered.len() as f64;
+    filtered.iter().map(move |image| {
+        let own: f64 = image.data[range.clone()].iter().map(|&value| f64::from(value)).sum();
+        (if total > 0.0 { own / total } else { 1.0 / count }) as f32
+    })
+}
