@@ -46,6 +46,9 @@ pub mod nn;
 pub mod reconstruct;
 pub mod solve;
 
+#[cfg(not(any(feature = "openimageio", feature = "pure-images")))]
+compile_error!("image files need one of the features `openimageio` and `pure-images`");
+
 pub mod adaptive;
 pub mod checkpoint;
 

@@ -4,7 +4,8 @@
     python denoise_mitsuba.py [scene.xml]
 
 Mitsuba renders the picture several times with different seeds: their mean is the noisy image, and how they differ is its
-variance, which filters go by. Albedo and normals come from its integrator `aov`.
+variance, which filters go by. Albedo and normals come from its integrator `aov`. The film needs a box filter: with wider ones
+neighbouring pixels share their noise, and no filter can tell it from the picture.
 """
 
 import sys
@@ -27,7 +28,9 @@ def scene():
     """The file on the command line, or Mitsuba's own Cornell box."""
     if len(sys.argv) > 1:
         return mi.load_file(sys.argv[1])
-    return mi.load_dict(mi.cornell_box())
+    box = mi.cornell_box()
+    box["sensor"]["film"]["rfilter"] = {"type": "box"}
+    return mi.load_dict(box)
 
 
 picture = scene()

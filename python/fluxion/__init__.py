@@ -10,6 +10,10 @@ Images are arrays of height, width and channels in 32-bit floats, in linear radi
 and share the memory of their owner. Long work releases the interpreter's lock and ends soon after Ctrl-C.
 """
 
+import importlib.util
+import os
+from pathlib import Path
+
 from . import data
 from ._fluxion import (
     FluxionError,
@@ -45,3 +49,13 @@ __all__ = [
     "render",
     "write_image",
 ]
+
+
+def _find_open_image_denoise() -> None:
+    """Lets the methods that need it find Open Image Denoise in the wheel `pyoidn` of the same environment."""
+    found = importlib.util.find_spec("pyoidn")
+    if found and found.origin:
+        os.environ.setdefault("OIDN_DIR", str(Path(found.origin).parent / "oidn"))
+
+
+_find_open_image_denoise()

@@ -139,7 +139,7 @@ def test_parameters_and_warnings(tmp_path):
         assert fluxion.load_file(path).warnings
 
 
-def test_light_groups_add_up(tmp_path, program, scene_file):
+def test_light_groups_add_up(scene_file):
     scene = fluxion.load_file(scene_file, size=SIZE, light_groups="all")
     rendering = fluxion.render(scene, spp=4)
     assert list(rendering.lights) == ["all"] and np.allclose(rendering.lights["all"], rendering.image, rtol=1e-5)

@@ -28,6 +28,7 @@ fn describe_checkpoint(path: &Path) -> Result<()> {
     out!("scene        {}, fingerprint {}", origin.scene, origin.fingerprint)?;
     out!("film         {}x{}, {} bytes a pixel", size.0, size.1, needs.bytes_per_pixel())?;
     out!("method       {}", origin.method)?;
+    lights(origin.lights.iter())?;
     out!("plan         {}", origin.plan)?;
     if needs.edges.is_sampled() {
         out!("differences  to {kernel}, shifted by {}", shift.id())?;
@@ -40,6 +41,12 @@ fn describe_checkpoint(path: &Path) -> Result<()> {
         out!("not finite   sample {} of pixel {},{} ({}), and maybe others", id.index, id.x, id.y, reason.0)?;
     }
     Ok(())
+}
+
+/// Names of light groups, if there are any.
+fn lights<'a>(names: impl Iterator<Item = &'a String>) -> Result<()> {
+    let names: Vec<_> = names.map(String::as_str).collect();
+    if names.is_empty() { Ok(()) } else { out!("lights       {}", names.join(" ")) }
 }
 
 fn describe_layers(path: &Path) -> Result<()> {
@@ -56,6 +63,7 @@ fn describe_layers(path: &Path) -> Result<()> {
     let names: Vec<_> = frame.present().filter(|(layer, _)| layer.bin_number().unwrap_or(0) == 0).collect();
     let names: Vec<_> = names.iter().flat_map(|(layer, _)| layer.channel_names()).collect();
     out!("channels     {}", names.join(" "))?;
+    lights(frame.lights.iter().map(|lights| &lights.name))?;
     if let Some(edges) = frame.own_edges() {
         let degree = 2.0 * edges.len() as f64 / edges.pixels().max(1) as f64;
         out!("edges        {}, {degree:.2} of every pixel, across {} steps", edges.len(), edges.offsets().len())?;

@@ -3,13 +3,15 @@
 
 use super::inputs::Inputs;
 use super::{Note, Reconstruction, Solution, parse};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::film::{Frame, Layer, LightLayers};
 use crate::image::Image;
 
 /// Method whose weights filter the groups' light where a method has none of its own.
-const FILTER: &str = "nlm";
-const WITHOUT_FEATURES: &str = "nlm:features=off";
+const FILTER: &str = "nlm:window=6";
+const WITHOUT_FEATURES: &str = "nlm:window=6,features=off";
+/// Times that they do: single bright samples of a group become hills instead of squares as large as the window.
+const PASSES: usize = 2;
 
 /// Images of all groups, in radiance, directly seen emitters included. They add up to the solution's image.
 pub fn groups(method: &dyn Reconstruction, frame: &Frame, solution: &Solution) -> Result<Vec<Note>> {
@@ -22,7 +24,7 @@ pub fn groups(method: &dyn Reconstruction, frame: &Frame, solution: &Solution) -
         None => {
             let features = frame.get(Layer::Albedo).and(frame.get(Layer::Normal)).is_some();
             let filter = parse(if features { FILTER } else { WITHOUT_FEATURES })?;
-            filter.filter(frame, &all)?.unwrap_or(all)
+            (0..PASSES).try_fold(all, |all, _| Ok::<_, Error>(filter.filter(frame, &all)?.unwrap_or(all)))?
         }
     };
     let filtered: Vec<_> = (0..frame.lights.len())

@@ -175,7 +175,11 @@ fn images_layers_and_merged_checkpoints_keep_the_groups() {
     fluxion(at).args(["reconstruct", "ab.ckpt", "-o", "ab.exr", "-q", "--method", "primal"]).assert().success();
     let (image, sum) = written(&at.join("ab.exr"));
     assert!(apart(&image, std::iter::once(&sum)) < 1e-5);
-    fluxion(at).args(["info", "a.ckpt"]).assert().success();
+    for file in ["ab.ckpt", "layers.exr"] {
+        let said = fluxion(at).args(["info", file]).assert().success();
+        let text = String::from_utf8_lossy(&said.get_output().stdout).into_owned();
+        assert!(text.contains("lights       key rest"), "{text}");
+    }
 }
 
 #[test]
