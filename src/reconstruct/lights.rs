@@ -1,6 +1,8 @@
 //! The light of groups of emitters in a reconstructed image: pixel by pixel it is shared among the groups as their own light is,
 //! filtered by one set of weights, so that the groups add up to the image whatever the method.
 
+use std::ops::Range;
+
 use super::inputs::Inputs;
 use super::{Note, Reconstruction, Solution, parse};
 use crate::error::{Error, Result};
@@ -42,17 +44,11 @@ pub fn groups(method: &dyn Reconstruction, frame: &Frame, solution: &Solution) -
 
 /// Shares of the groups in a value, which add up to one: those of its channel, of all channels where that is black, or equal ones.
 fn shares(filtered: &[Image], i: usize) -> impl Iterator<Item = f32> {
-    let pixel = i / 3 * 3..i / 3 * 3 + 3;
-    let sum = |range: std::ops::Range<usize>| {
-        filtered.iter().map(|image| image.data[range.clone()].iter().map(|&value| f64::from(value)).sum::<f64>()).sum()
-    };
-    let (range, total): (_, f64) = match (sum(i..i + 1), sum(pixel.clone())) {
-        (of_channel, _) if of_channel > 0.0 => (i..i + 1, of_channel),
-        (_, of_pixel) => (pixel, of_pixel),
-    };
-    let count = filtered.len() as f64;
-    filtered.iter().map(move |image| {
-        let own: f64 = image.data[range.clone()].iter().map(|&value| f64::from(value)).sum();
-        (if total > 0.0 { own / total } else { 1.0 / count }) as f32
-    })
+    let light =
+        |image: &Image, values: Range<usize>| image.data[values].iter().map(|&value| f64::from(value)).sum::<f64>();
+    let of_all = |values: Range<usize>| filtered.iter().map(|image| light(image, values.clone())).sum::<f64>();
+    let (channel, pixel) = (i..i + 1, i / 3 * 3..i / 3 * 3 + 3);
+    let values = if of_all(channel.clone()) > 0.0 { channel } else { pixel };
+    let (whole, equal) = (of_all(values.clone()), 1.0 / filtered.len() as f32);
+    filtered.iter().map(move |image| if whole > 0.0 { (light(image, values.clone()) / whole) as f32 } else { equal })
 }

@@ -6,7 +6,10 @@ use std::path::Path;
 
 use image::codecs::jpeg::JpegEncoder;
 use image::codecs::{hdr::HdrEncoder, png::PngEncoder, tiff::TiffEncoder};
-use image::{ColorType, DynamicImage, ExtendedColorType, ImageDecoder, ImageEncoder, ImageError, ImageReader, Limits};
+use image::{
+    ColorType, DynamicImage, ExtendedColorType, ImageDecoder, ImageEncoder, ImageError, ImageFormat, ImageReader,
+    Limits,
+};
 
 use super::{Format, Samples, byte};
 use crate::error::{Error, Result};
@@ -58,7 +61,11 @@ pub fn open(path: &Path) -> Result<(Header, Box<dyn Format>)> {
 impl Format for Picture {
     fn samples(&self, path: &Path) -> Result<Samples> {
         let shares = |values: Vec<u16>| values.into_iter().map(|value| f32::from(value) / 65535.0).collect();
-        let image = reader(path)?.decode().map_err(|error| Error::io(path, error))?;
+        let reader = reader(path)?;
+        if let Some(bytes) = (reader.format() == Some(ImageFormat::Jpeg)).then(|| jpeg(path)).flatten() {
+            return Ok(Samples::Bytes(bytes));
+        }
+        let image = reader.decode().map_err(|error| Error::io(path, error))?;
         Ok(match image {
             DynamicImage::ImageLuma16(image) => Samples::Floats(shares(image.into_raw())),
             DynamicImage::ImageLumaA16(image) => Samples::Floats(shares(image.into_raw())),
@@ -69,6 +76,19 @@ impl Format for Picture {
             other => Samples::Bytes(other.into_bytes()),
         })
     }
+}
+
+/// Samples of a jpg file, decoded by the code that OpenImageIO calls: others round in their own ways. None where that code gives up,
+/// which it does by unwinding.
+fn jpeg(path: &Path) -> Option<Vec<u8>> {
+    let decode = || {
+        let file = mozjpeg::Decompress::new_path(path)?;
+        let mut lines = if file.components().len() == 1 { file.grayscale()? } else { file.rgb()? };
+        let bytes = lines.read_scanlines::<u8>()?;
+        lines.finish()?;
+        Ok::<_, std::io::Error>(bytes)
+    };
+    std::panic::catch_unwind(decode).ok()?.ok()
 }
 
 /// Writes the channels of a colour, in eight bits or floats as the format has them.
