@@ -1,7 +1,9 @@
 //! Films and files: threads do not matter, nothing is lost on disk, an independent reader sees the same.
 
 use crate::common::{bundled, film, sensor};
-use fluxion::film::{Layer, Needs, exr as layers};
+use fluxion::film::{Frame, Layer, Needs, exr as layers};
+use fluxion::image::Image;
+use fluxion::math::Rgb;
 use fluxion::plan::Plan;
 
 fn on_threads(threads: usize) -> fluxion::film::Film {
@@ -141,4 +143,28 @@ fn what_nobody_needs_is_not_recorded() {
         assert!(frame.get(layer).is_none(), "{}", layer.name());
     }
     assert!(film(&scene, 4, 1, Needs::ALL).develop().present().count() == Layer::COUNT - 1);
+}
+
+#[test]
+fn renders_of_other_programs_tell_their_variance() {
+    let values = [1.0f32, 3.0, 2.0, 6.0];
+    let renders: Vec<_> =
+        values.iter().map(|&value| Image::from_rgb(2, 1, |x, _| Rgb::splat(value + x as f32))).collect();
+    let mut frame = Frame::of_renders(&renders, 8).unwrap();
+    frame.set(Layer::Albedo, Image::new(2, 1, 3));
+    frame.complete(None);
+    assert_eq!(frame.get(Layer::Color).unwrap().data, [3.0, 3.0, 3.0, 4.0, 4.0, 4.0]);
+    // 4, 0, 1 and 9 over three degrees of freedom and four renders.
+    frame.get(Layer::ColorVariance).unwrap().data.iter().for_each(|value| assert!((value - 14.0 / 12.0).abs() < 1e-6));
+    assert_eq!(frame.get(Layer::Samples).unwrap().data, [32.0; 2]);
+    assert_eq!(frame.get(Layer::BinColor(5)).unwrap().data[0], values[1]);
+    assert_eq!(frame.get(Layer::AlbedoVariance).unwrap().data, [0.0; 6]);
+    let [a, b] = [0, 1].map(|half| frame.color_half(half).unwrap()[0].data[0]);
+    assert_eq!((a, b), (1.5, 4.5));
+    // Of three, one has a half to itself.
+    let three = Frame::of_renders(&renders[..3], 1).unwrap();
+    assert_eq!([0, 1].map(|k| three.get(Layer::BinColor(k)).unwrap().data[0]), [1.5, 3.0]);
+    let other = Image::new(1, 1, 3);
+    assert!(Frame::of_renders(&renders[..1], 1).unwrap_err().to_string().contains("two or more"));
+    assert!(Frame::of_renders(&[renders[0].clone(), other], 1).is_err());
 }
