@@ -92,7 +92,7 @@ pub struct Wishes {
 impl Wishes {
     /// The context of a method, for a closure that takes progress.
     pub fn context<'a>(self, progress: &'a dyn Fn(&str, f32)) -> Context<'a> {
-        Context { progress, memory: self.memory.map(|megabytes| megabytes << 20), notes: self.notes }
+        Context { progress, memory: self.memory.map(|megabytes| megabytes.saturating_mul(1 << 20)), notes: self.notes }
     }
 
     /// Reconstructs.

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use fluxion::scene::load::{self, Options};
 use fluxion::scene::sensor::Crop;
-use pyo3::exceptions::{PyUserWarning, PyValueError};
+use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -53,12 +53,9 @@ pub fn load_file(
         max_depth,
         strict,
         threads,
-        texture_memory: texture_memory << 20,
+        texture_memory: texture_memory.saturating_mul(1 << 20),
         ..Options::default()
     };
-    if size.is_some_and(|(width, height)| width == 0 || height == 0) {
-        return Err(PyValueError::new_err("a film has at least one pixel"));
-    }
     load(py, path, options, light_groups)
 }
 

@@ -8,13 +8,15 @@ use std::thread;
 use std::time::Duration;
 
 use fluxion::error::{Error, Result};
-use pyo3::exceptions::PyRuntimeError;
+use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 
 use crate::error::raised;
 
 /// Time between two looks for signals.
 const PAUSE: Duration = Duration::from_millis(50);
+/// Threads whose start does not yet take longer than the work.
+const MOST_THREADS: usize = 1024;
 /// Stack of the thread, as that of a program's first one.
 const STACK: usize = 8 << 20;
 
@@ -58,6 +60,9 @@ pub fn run<T: Send + 'static>(
     progress: Option<&Bound<'_, PyAny>>,
     work: impl FnOnce(&Link) -> Result<T> + Send + 'static,
 ) -> PyResult<T> {
+    if threads > MOST_THREADS {
+        return Err(PyValueError::new_err(format!("threads are a number up to {MOST_THREADS}")));
+    }
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
     let pool = (threads > 0).then(|| pool.build()).transpose();
     let pool = pool.map_err(|error| raised(Error::Usage(format!("{threads} threads: {error}"))))?;

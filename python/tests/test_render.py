@@ -107,6 +107,8 @@ def test_memory_does_not_grow(scene_file):
         (lambda file: fluxion.render(file, kernel="structure", method="frgr"), ValueError, "direct neighbours"),
         (lambda file: fluxion.render(file, adaptive="nosuch"), ValueError, "allocator `nosuch`"),
         (lambda file: fluxion.load_file(file, sensor="nosuch"), ValueError, "no sensor `nosuch`"),
+        (lambda file: fluxion.render(file, spp=1, threads=10**6), ValueError, "up to 1024"),
+        (lambda file: fluxion.load_file(file, size=(0, 9)), fluxion.FluxionError, "a film of 0x9 pixels"),
         (lambda file: fluxion.load_file(file, nosuch=1), ValueError, "no parameter `nosuch`"),
         (lambda file: fluxion.load_file(file, light_groups="key=nosuch*"), ValueError, "fits no emitter"),
     ],
