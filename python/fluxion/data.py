@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -53,7 +53,7 @@ class Sample:
         for k, channel in enumerate(self.channels):
             layer = channel.rpartition(".")[0] or "color"
             groups.setdefault(layer, []).append(k)
-        return {layer: array[..., slice(at[0], at[-1] + 1)] for layer, at in groups.items()}
+        return {layer: array[..., at[0] : at[-1] + 1] for layer, at in groups.items()}
 
     def target(self) -> NDArray[np.floating]:
         """The image to be learned, directly seen emitters included: height x width x 3."""
@@ -89,9 +89,6 @@ class Dataset(Sequence[Sample]):
         if isinstance(index, slice):
             return [Sample(path) for path in self._manifests[index]]
         return Sample(self._manifests[index])
-
-    def __iter__(self) -> Iterator[Sample]:
-        return map(Sample, self._manifests)
 
     def __repr__(self) -> str:
         return f"<fluxion.data.Dataset {self.folder} of {len(self)} pictures>"

@@ -13,7 +13,7 @@ use crate::frame::Frame;
 use crate::work::{self, Link};
 
 /// A reconstructed image.
-#[pyclass(frozen, module = "fluxion")]
+#[pyclass(frozen, subclass, module = "fluxion")]
 pub struct Solution(pub Solved);
 
 /// A solution with the images of its light groups.

@@ -6,13 +6,11 @@ use std::time::Duration;
 
 use fluxion::adaptive::{self, AdaptiveSettings, Allocator, Limits};
 use fluxion::film::{Needs, Provenance};
-use fluxion::image::io::DataWindow;
 use fluxion::neighbours::Selector;
 use fluxion::plan::{self, Plan};
 use fluxion::reconstruct::{self, Reconstruction};
 use fluxion::reference::fingerprint;
 use fluxion::render::{Budget, Control, RenderSettings, SHIFTS, Shift};
-use numpy::PyArray3;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -23,7 +21,7 @@ use crate::scene::SceneOrPath;
 use crate::work::{self, Link};
 
 /// A rendered and reconstructed image, with the frame that it was made of.
-#[pyclass(frozen, module = "fluxion")]
+#[pyclass(frozen, extends = Solution, module = "fluxion")]
 pub struct Rendering {
     /// The layers that were recorded.
     #[pyo3(get)]
@@ -37,41 +35,14 @@ pub struct Rendering {
     /// What was computed and what was left out, as `fluxion info` says it.
     #[pyo3(get)]
     plan: String,
-    /// The reconstruction.
-    #[pyo3(get)]
-    solution: Py<Solution>,
 }
 
 #[pymethods]
 impl Rendering {
-    /// The image in radiance: height x width x 3.
+    /// The reconstruction by itself.
     #[getter]
-    fn image<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f32>>> {
-        Ok(self.solution.bind(py).getattr("image")?.extract()?)
-    }
-
-    /// Expected squared error of each value, if the method estimates it.
-    #[getter]
-    fn error<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.solution.bind(py).getattr("error")
-    }
-
-    /// Share of every pixel that is covered, if the film's format has it.
-    #[getter]
-    fn alpha<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.solution.bind(py).getattr("alpha")
-    }
-
-    /// Intermediate images by their names, if they were asked for.
-    #[getter]
-    fn notes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.solution.bind(py).getattr("notes")
-    }
-
-    /// The light of groups of emitters by their names, if they were asked for; the images add up to `image`.
-    #[getter]
-    fn lights<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.solution.bind(py).getattr("lights")
+    fn solution<'py>(slf: &Bound<'py, Self>) -> Bound<'py, Solution> {
+        slf.as_super().clone()
     }
 
     fn __repr__(&self) -> String {
@@ -120,7 +91,7 @@ impl Job {
         };
         let (spp, seconds) = (render.film.mean_spp(), render.elapsed.as_secs_f64());
         let mut frame = frame.with_provenance(self.provenance.after(spp, seconds));
-        frame.window = self.scene.sensor().part().map(|(crop, full)| DataWindow { origin: (crop.x, crop.y), full });
+        frame.window = self.scene.sensor().window();
         Ok(Done { frame, solution, spp, seconds })
     }
 }
@@ -201,7 +172,7 @@ pub fn render(
     notes: bool,
     threads: usize,
     progress: Option<&Bound<'_, PyAny>>,
-) -> PyResult<Rendering> {
+) -> PyResult<Py<Rendering>> {
     let limits = limits(spp, time, target_error)?;
     let reconstruction = reconstruct::parse(method).map_err(raised)?;
     let allocator = adaptive::chosen(adaptive, &limits, reconstruction.as_ref()).map_err(raised)?;
@@ -219,6 +190,6 @@ pub fn render(
     let wishes = Wishes { memory, notes };
     let job = Job { scene, method: reconstruction, allocator, limits, settings, wishes, provenance };
     let Done { frame, solution, spp, seconds } = work::run(py, threads, progress, move |link| job.run(link))?;
-    let (frame, solution) = (Py::new(py, Frame(Arc::new(frame)))?, Py::new(py, Solution(solution))?);
-    Ok(Rendering { frame, spp, seconds, plan: plan.summary(), solution })
+    let rendering = Rendering { frame: Py::new(py, Frame(Arc::new(frame)))?, spp, seconds, plan: plan.summary() };
+    Py::new(py, PyClassInitializer::from(Solution(solution)).add_subclass(rendering))
 }

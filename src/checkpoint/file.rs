@@ -49,7 +49,7 @@ pub fn load(path: &Path) -> Result<Checkpoint> {
         from.tile(&mut tile)?;
         tiles.push(tile);
     }
-    let film = Film::of_tiles((width, height), needs, kernel, tiles).with_lights(&from.header.origin.lights);
+    let film = Film::of_tiles((width, height), (needs, &from.header.origin.lights), kernel, tiles);
     let adaptive = from.header.adaptive.take();
     let journal = adaptive.map(|adaptive| journal(adaptive, (width, height), &mut from)).transpose()?;
     let elapsed = Duration::try_from_secs_f64(from.header.seconds)

@@ -57,10 +57,7 @@ pub fn develop(paths: &[PathBuf], beside: &Path) -> Result<(Frame, Merged)> {
         tiles.push(tile);
         Ok(())
     })?;
-    let outcome = {
-        let film = Film::of_tiles(origin.size, origin.needs, kernel, tiles);
-        RenderOutcome::of(film.with_lights(&origin.lights))
-    };
+    let outcome = RenderOutcome::of(Film::of_tiles(origin.size, (origin.needs, &origin.lights), kernel, tiles));
     let frame = outcome.film.develop().with_provenance(origin.provenance(&outcome));
     Ok((frame, Merged { origin, samples: outcome.film.samples() }))
 }

@@ -83,9 +83,14 @@ impl Film {
         Self { lights: names.to_vec(), ..self }
     }
 
-    /// A film of all its tiles.
-    pub(crate) fn of_tiles((width, height): (usize, usize), needs: Needs, kernel: Kernel, tiles: Vec<Tile>) -> Self {
-        Self { width, height, needs, lights: Vec::new(), kernel, tiles }
+    /// A film of all its tiles, with the names of its groups of emitters.
+    pub(crate) fn of_tiles(
+        (width, height): (usize, usize),
+        (needs, lights): (Needs, &[String]),
+        kernel: Kernel,
+        tiles: Vec<Tile>,
+    ) -> Self {
+        Self { width, height, needs, lights: Vec::new(), kernel, tiles }.with_lights(lights)
     }
 
     /// The film without half-edges, which are recorded from when its neighbours are chosen.

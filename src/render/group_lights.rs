@@ -19,11 +19,6 @@ impl GroupLights {
         self.all.resize(samples * groups, GroupLight::default());
     }
 
-    /// Whether there are groups.
-    pub fn are_recorded(&self) -> bool {
-        self.groups > 0
-    }
-
     /// The light, sample by sample.
     pub fn all(&self) -> &[GroupLight] {
         &self.all

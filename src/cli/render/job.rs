@@ -6,7 +6,7 @@ use std::time::Instant;
 use anyhow::Result;
 use fluxion::adaptive::{self, AdaptiveOutcome, AdaptiveSettings, Allocator, Start};
 use fluxion::film::{Frame, Needs, Provenance, exr};
-use fluxion::image::io::{DataWindow, failed_lookups};
+use fluxion::image::io::failed_lookups;
 use fluxion::mattes::{self, MOST_SAMPLES};
 use fluxion::neighbours::Selector;
 use fluxion::reconstruct::{Reconstruction, Solution};
@@ -157,7 +157,7 @@ impl Job<'_> {
         let (start, sensor) = (Instant::now(), self.scene.sensor());
         let mattes = mattes::mattes(self.scene, self.args.seed, stats.spp.clamp(1, MOST_SAMPLES));
         let attributes = self.provenance(stats).attributes();
-        mattes::save(path, (sensor.width, sensor.height), &mattes, self.window(), attributes)?;
+        mattes::save(path, (sensor.width, sensor.height), &mattes, sensor.window(), attributes)?;
         stats.seconds.write += start.elapsed().as_secs_f64();
         Ok(())
     }
@@ -189,13 +189,8 @@ impl Job<'_> {
     /// A frame with everything that files say of it.
     fn complete(&self, frame: Frame, stats: &Stats) -> Frame {
         let mut frame = frame.with_provenance(self.provenance(stats));
-        frame.window = self.window();
+        frame.window = self.scene.sensor().window();
         frame
-    }
-
-    /// The part of a film that is rendered.
-    fn window(&self) -> Option<DataWindow> {
-        self.scene.sensor().part().map(|(crop, full)| DataWindow { origin: (crop.x, crop.y), full })
     }
 
     /// Provenance of everything that is written.

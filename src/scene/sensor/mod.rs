@@ -7,6 +7,7 @@ use self::film::FilmWindow;
 use std::rc::Rc;
 
 use crate::error::Result;
+use crate::image::io::DataWindow;
 use crate::math::lanes::{Lanes, Lanes3};
 use crate::math::{Mat4, Vec2, Vec3, Vec4, vec2, warp};
 use crate::scene::Ray;
@@ -230,9 +231,9 @@ impl Sensor {
         self.film.alpha
     }
 
-    /// The pixels of the film that are rendered and the size of the whole film, where these are a part of it.
-    pub fn part(&self) -> Option<(Crop, (usize, usize))> {
-        self.film.part
+    /// Position of the rendered pixels in the whole film, where they are a part of it.
+    pub fn window(&self) -> Option<DataWindow> {
+        self.film.part.map(|(crop, full)| DataWindow { origin: (crop.x, crop.y), full })
     }
 
     /// Whether the lens has an extent, so that pixels differ by their positions on it, too.
