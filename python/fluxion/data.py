@@ -36,7 +36,12 @@ class Sample:
     def array(self, spp: int) -> NDArray[np.floating]:
         """All channels at so many samples, mapped from the file: height x width x channels, as `channels` names them."""
         self._check(spp, "npy")
-        return np.load(f"{self._stem}_{spp:04}spp.npy", mmap_mode="r")
+        path = f"{self._stem}_{spp:04}spp.npy"
+        array = np.load(path, mmap_mode="r")
+        if array.shape[-1] != len(self.channels):
+            what = f"{array.shape[-1]} channels, its manifest names {len(self.channels)}: render the frame again"
+            raise ValueError(f"{path}: the array has {what}")
+        return array
 
     @property
     def channels(self) -> list[str]:

@@ -1,6 +1,7 @@
 """Data sets that the program has written, and the type stubs."""
 
 import ast
+import shutil
 import subprocess
 from pathlib import Path
 
@@ -43,6 +44,17 @@ def test_channels_have_their_names(folder):
     at = sample.channels.index("depth.Z")
     assert np.array_equal(sample.inputs(2)["depth"][..., 0], sample.array(2)[..., at])
     assert np.abs(sample.difference()).max() > 0
+
+
+def test_arrays_of_other_channels_than_named_are_refused(folder, tmp_path):
+    sample = fluxion.data.open(folder)[0]
+    if sample.manifest["recipe"]["layout"] == "oidn":
+        return
+    shutil.copytree(folder, tmp_path, dirs_exist_ok=True)
+    [path] = tmp_path.glob("*_0002spp.npy")
+    np.save(path, np.load(path)[..., 1:])
+    with pytest.raises(ValueError, match="render the frame again"):
+        fluxion.data.open(tmp_path)[0].inputs(spp=2)
 
 
 def test_a_folder_must_be_there(tmp_path):

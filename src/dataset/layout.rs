@@ -111,12 +111,13 @@ struct Plane<'a> {
     root: bool,
 }
 
-/// Layers, then for every method its image, its expected error and its intermediate images.
+/// Layers, then for every method its image, its expected error and its intermediate images: the same channels at every number of samples.
 fn planes(snapshot: &Snapshot) -> Vec<Plane<'_>> {
     let mut planes: Vec<Plane> = snapshot
         .frame
         .present()
-        .filter(|(layer, _)| layer.is_in(snapshot.layers))
+        // Its presence depends on the number of samples, and uncertainty is in the deviations.
+        .filter(|(layer, _)| layer.is_in(snapshot.layers) && *layer != Layer::EdgeSamples)
         .map(|(layer, image)| {
             let names = layer.channel_names();
             let root = names[0].contains("variance");
@@ -162,4 +163,24 @@ fn picture(path: &Path, image: &Image, number: Number) -> Result<()> {
     let limit = if number == Number::Float16 { half::f16::MAX.to_f32() } else { f32::MAX };
     let data = image.data.iter().map(|value| value.clamp(-limit, limit)).collect();
     write(path, &Pixels { width, height, channels, data, window: None, attributes: Vec::new() }, kind, Some("zip"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn channels_are_the_same_whether_some_samples_were_without_differences_or_not() {
+        let channels = |thinned: bool| {
+            let mut frame = Frame::new(3, 2);
+            let layers = [Layer::Color, Layer::Samples, Layer::EdgeSamples];
+            for layer in layers.into_iter().filter(|layer| thinned || *layer != Layer::EdgeSamples) {
+                frame.set(layer, Image::new(3, 2, layer.channel_names().len()));
+            }
+            let snapshot = Snapshot { frame, layers: Needs::default(), solutions: Vec::new() };
+            planes(&snapshot).into_iter().flat_map(|plane| plane.channels).collect::<Vec<_>>()
+        };
+        assert_eq!(channels(true), channels(false));
+        assert_eq!(channels(true), ["R", "G", "B", "samples.Y"]);
+    }
 }

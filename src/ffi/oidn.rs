@@ -12,6 +12,17 @@ use libloading::{Library, Symbol};
 /// An image of three floats a pixel, under the name that the filter knows it by.
 pub type Input<'a> = (&'static CStr, &'a [f32]);
 
+/// Size of the networks: larger ones take more time and leave less error.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Quality {
+    /// The smallest.
+    Fast = 4,
+    /// The middle: two fifths of the largest one's work.
+    Balanced = 5,
+    /// The largest.
+    High = 6,
+}
+
 /// Handles of devices and filters.
 type Handle = *mut c_void;
 
@@ -168,6 +179,7 @@ impl Device {
         (width, height): (usize, usize),
         inputs: &[Input],
         options: &[&'static CStr],
+        quality: Quality,
     ) -> Result<Vec<f32>, String> {
         let floats = width.checked_mul(height).and_then(|pixels| pixels.checked_mul(3));
         let floats = floats.filter(|&floats| inputs.iter().all(|(_, data)| data.len() == floats));
@@ -194,6 +206,7 @@ impl Device {
         // SAFETY: the filter is valid, all its images are set, and it is not used after its release.
         unsafe {
             options.iter().for_each(|option| (functions.set_filter_bool)(filter, option.as_ptr(), true));
+            (functions.set_filter_int)(filter, c"quality".as_ptr(), quality as c_int);
             self.memory.iter().for_each(|&most| (functions.set_filter_int)(filter, c"maxMemoryMB".as_ptr(), most));
             (functions.commit_filter)(filter);
             (functions.execute_filter)(filter);

@@ -4,7 +4,7 @@ use super::{Context, Method, Parameter, Parameters, Reconstruction, Solution, Tr
 use crate::error::Result;
 use crate::film::{Frame, Layer, Needs};
 use crate::image::Image;
-use crate::image::oidn::{check, denoise};
+use crate::image::oidn::{Features, Quality, check, denoise};
 
 /// `oidn`.
 pub const METHOD: Method = Method {
@@ -15,7 +15,12 @@ pub const METHOD: Method = Method {
         Parameter {
             name: "prefilter",
             default: "accurate",
-            summary: "of albedo and normal: `accurate`, each denoised by itself first, or `none`",
+            summary: "of albedo and normal: `accurate`, each denoised by itself first, `balanced`, by smaller networks, or `none`",
+        },
+        Parameter {
+            name: "quality",
+            default: "high",
+            summary: "of the networks: `high`, `balanced` or `fast`, which take less time and leave more error",
         },
         Parameter {
             name: "direct",
@@ -27,13 +32,22 @@ pub const METHOD: Method = Method {
 };
 
 fn make(parameters: &Parameters) -> Result<Box<dyn Reconstruction>> {
-    let accurate = parameters.choice("prefilter", &["accurate", "none"])? == "accurate";
+    let quality = match parameters.choice("quality", &["high", "balanced", "fast"])?.as_ref() {
+        "balanced" => Quality::Balanced,
+        "fast" => Quality::Fast,
+        _ => Quality::High,
+    };
+    let features = match parameters.choice("prefilter", &["accurate", "balanced", "none"])?.as_ref() {
+        "accurate" => Features::Prefiltered(quality),
+        "balanced" => Features::Prefiltered(Quality::Balanced),
+        _ => Features::Noisy,
+    };
     check()?;
-    Ok(Box::new(Oidn { accurate, direct: parameters.switch("direct")? }))
+    Ok(Box::new(Oidn { networks: (quality, features), direct: parameters.switch("direct")? }))
 }
 
 struct Oidn {
-    accurate: bool,
+    networks: (Quality, Features),
     direct: bool,
 }
 
@@ -43,18 +57,24 @@ impl Reconstruction for Oidn {
     }
 
     fn reconstruct(&self, frame: &Frame, context: &Context) -> Result<Solution> {
-        let image = clean(frame, self.accurate, frame.get(Layer::Direct).filter(|_| self.direct), context.memory)?;
+        let direct = frame.get(Layer::Direct).filter(|_| self.direct);
+        let image = clean(frame, direct, self.networks, context.memory)?;
         Ok(Solution { image, alpha: None, error: None, notes: Vec::new() })
     }
 }
 
 /// A frame's scattered light, denoised: together with the light of directly seen emitters, if that is given, which is
 /// subtracted again, since it is added to every method's image. The library takes about so many bytes of `memory`.
-pub fn clean(frame: &Frame, accurate: bool, direct: Option<&Image>, memory: Option<u64>) -> Result<Image> {
+pub fn clean(
+    frame: &Frame,
+    direct: Option<&Image>,
+    networks: (Quality, Features),
+    memory: Option<u64>,
+) -> Result<Image> {
     let (albedo, normal) = (frame.require(Layer::Albedo)?, frame.require(Layer::Normal)?);
     let mut color = frame.require(Layer::Color)?.clone();
     direct.iter().for_each(|direct| color.add(direct));
-    let mut image = denoise(&color, [albedo, normal], accurate, memory)?;
+    let mut image = denoise(&color, [albedo, normal], networks, memory)?;
     direct.iter().for_each(|direct| {
         image.data.iter_mut().zip(&direct.data).for_each(|(value, direct)| *value -= direct);
     });

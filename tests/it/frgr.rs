@@ -99,6 +99,7 @@ fn every_form_and_switch_is_far_below_the_samples() {
         "frgr:albedo=off,normal=off",
         "frgr:denoised=off",
         "frgr:enhance=off",
+        "frgr:filter=off",
         "frgr:radius=7",
     ];
     for method in methods {
@@ -106,6 +107,14 @@ fn every_form_and_switch_is_far_below_the_samples() {
         assert!(ours < 0.2 * primal, "{method}: {ours} of {primal}");
     }
     assert!(error("frgr", &frame) < error("l2", &frame));
+}
+
+#[test]
+fn without_the_filter_the_enhanced_image_is_the_result() {
+    let frame = frame(1, 16.0, 2.0);
+    let filtered = solve(parse("frgr").unwrap().as_ref(), &frame, &Context { notes: true, ..Context::QUIET }).unwrap();
+    assert_eq!(&run("frgr:filter=off", &frame).image, filtered.note("level0_enhanced").unwrap());
+    assert_eq!(run("frgr:filter=off,levels=3", &frame).image, run("frgr:filter=off", &frame).image);
 }
 
 #[test]

@@ -80,7 +80,15 @@ fn noise_goes_whatever_the_options_and_lamps_stay() {
     frame.set(Layer::Normal, image(|_, _| vec3(0.0, 0.0, 1.0)));
     let mse = metrics::find("mse").unwrap();
     let before = mse.measure(&noisy, &truth).unwrap().mean;
-    for method in ["oidn", "oidn:direct=off", "oidn:prefilter=none", "oidn:prefilter=none,direct=off"] {
+    for method in [
+        "oidn",
+        "oidn:direct=off",
+        "oidn:prefilter=none",
+        "oidn:prefilter=none,direct=off",
+        "oidn:prefilter=balanced",
+        "oidn:quality=balanced",
+        "oidn:quality=fast",
+    ] {
         let context = Context::QUIET;
         let mut result = solve(parse(method).unwrap().as_ref(), &frame, &context).unwrap().image;
         // The network dims a lamp of a single row; added afterwards it is as it was.
@@ -92,5 +100,5 @@ fn noise_goes_whatever_the_options_and_lamps_stay() {
         let after = mse.measure(&result, &truth).unwrap().mean;
         assert!(after < 0.1 * before, "{method}: {:.3} of the noise", after / before);
     }
-    assert!(parse("oidn:prefilter=fast").err().unwrap().to_string().contains("accurate or none"));
+    assert!(parse("oidn:prefilter=fast").err().unwrap().to_string().contains("accurate or balanced or none"));
 }

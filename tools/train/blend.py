@@ -1,15 +1,14 @@
 """The network of the method `blend`: convex weights of finished images, pixel by pixel.
 
-    python tools/train/blend.py train own FRAMES... --run runs/blend-own
-    python tools/train/blend.py test own FRAMES... --run runs/blend-own
-    python tools/train/blend.py export own FRAMES... --run runs/blend-own
+    python tools/train/blend.py train FRAMES... --run runs/blend
+    python tools/train/blend.py test FRAMES... --run runs/blend
+    python tools/train/blend.py export FRAMES... --run runs/blend
 
-`own` mixes Fluxion's own images, `oidn` also those of Open Image Denoise. FRAMES are folders of `fluxion dataset`; ten of every
-hundred scenes are kept apart for tests. Training goes on where it was interrupted, and logs to log.csv. `export`
-writes src/reconstruct/blend/NAME.safetensors if the gates hold: on the scenes kept apart less error than the best single
-image at every sample count. Features and safety rule are those of src/reconstruct/blend/.
+FRAMES are folders of `fluxion dataset` with the images that are mixed; ten of every hundred scenes are kept apart for tests.
+Training goes on where it was interrupted, and logs to log.csv. `export` writes src/reconstruct/blend/oidn.safetensors if the gate
+holds: on the scenes kept apart less error than the best single image at every sample count. Features and safety rule are those
+of src/reconstruct/blend/.
 """
-import argparse
 import json
 import os
 
@@ -24,9 +23,10 @@ import residual
 import runs
 from frames import planes
 
-# Images; the last, the sampled colours, takes what the safety rule leaves.
-CANDIDATES = {"own": ["net", "frgr", "frgr_denoised", "frgr_level0_enhanced", ""],
-              "oidn": ["frgr_denoiser_oidn", "frgr_denoiser_oidn_denoised", "frgr_denoiser_oidn_level0_enhanced", "net", "frgr", ""]}
+# Images that are mixed; the last, the sampled colours, takes what the safety rule leaves.
+CANDIDATES = ["frgr_denoiser_oidn_level0_enhanced", "frgr_denoiser_oidn_denoised", "net_image_safe", "frgr", ""]
+# The one whose own error is estimated.
+BEST = CANDIDATES.index("net_image_safe")
 WIDTH, SLOPE = 24, 0.01
 # Radius of the window that residuals are averaged over, by themselves.
 RESIDUAL = 3
@@ -36,7 +36,8 @@ EPSILON = 0.03
 FLOOR = 2e-4
 
 
-def weigher(candidates):
+def weigher():
+    candidates = len(CANDIDATES)
     inputs = 4 * candidates + 5
     layers = [nn.Conv2d(inputs, WIDTH, 3, padding=1), nn.LeakyReLU(SLOPE),
               nn.Conv2d(WIDTH, WIDTH, 3, padding=2, dilation=2), nn.LeakyReLU(SLOPE),
@@ -49,12 +50,10 @@ def weigher(candidates):
     return nn.Sequential(*layers)
 
 
-def prepare(frame, names, network):
-    """Images (candidates, 3, height, width), features, trust of each image and target; `network` is that of the method net."""
+def prepare(frame):
+    """Images (candidates, 3, height, width), features, trust of each image and target."""
     colour, variance = planes(frame.radiance("")), net.variance_of(frame)
-    given = torch.stack([planes(frame.image(name)) for name in net.IMAGES])
-    corrected = net.solved(network, net.features(frame, given), given, variance, frame.spp)
-    images = torch.stack([corrected if name == "net" else planes(frame.image(name)) for name in names])
+    images = torch.stack([planes(frame.image(name)) for name in CANDIDATES])
     luminance = images.mean(1)
     noise = residual.box(variance, residual.RADIUS).clamp(min=residual.LEAST_NOISE)
     middle = luminance.mean(0, keepdim=True).clamp(min=0)
@@ -62,7 +61,7 @@ def prepare(frame, names, network):
     apart = residual.box(colour.mean(0, keepdim=True) - luminance, RESIDUAL)
     deviation = (residual.box(variance, RESIDUAL) / (2 * RESIDUAL + 1) ** 2 + 1e-9).sqrt()
     bias = torch.cat([residual.squared_error(colour, variance, image) for image in images])
-    claimed = residual.estimated_error(colour, variance, corrected)
+    claimed = residual.estimated_error(colour, variance, images[BEST])
     features = torch.cat([
         torch.asinh(3 * (luminance - middle) / unit), torch.asinh(3 * apart / unit), torch.asinh(apart / deviation),
         torch.asinh(bias / noise),
@@ -90,14 +89,14 @@ def blended(weigh, sample):
     return (kept.unsqueeze(-3) * sample["images"]).sum(-4)
 
 
-def samples(folders, kind):
+def samples(folders):
     """Training samples and those of the scenes kept apart."""
-    everything, network = frames.load(folders), net.shipped()
+    everything = frames.load(folders)
     last = {frame.name: frame for frame in everything}
     made = []
     clean = {name: frame.image("frgr").mean(-1) / frame.scale for name, frame in last.items()}
     for frame in everything:
-        sample = prepare(frame, CANDIDATES[kind], network)
+        sample = prepare(frame)
         # What errors are divided by comes from other samples than the target's: noise in it would darken the image.
         sample["divisor"] = torch.from_numpy(clean[frame.name] * frame.scale)[None] ** 2 + EPSILON
         made.append(sample)
@@ -126,71 +125,64 @@ def loss(weigh, batch):
 
 
 def train(options):
-    training, apart = samples(options.frames, options.kind)
+    training, apart = samples(options.frames)
     if not apart:
         raise SystemExit("none of these scenes is kept apart for tests: those are numbers 90 to 99 of every hundred")
     print(f"{len(training)} images to train on, {len(apart)} apart", flush=True)
     torch.manual_seed(options.seed)
-    weigh = weigher(len(CANDIDATES[options.kind]))
+    weigh = weigher()
     runs.descend(weigh, lambda rng: loss(weigh, crops(training, rng)), RATE, options)
 
 
 def trained(options):
-    return runs.trained(weigher(len(CANDIDATES[options.kind])), options)
+    return runs.trained(weigher(), options)
 
 
-def compared(weigh, names, apart):
-    """Errors on the scenes kept apart, as a table: geometric means over those of the best single image. True if all are less."""
+def compared(weigh, apart):
+    """Errors on the scenes kept apart, as a table: the targets' noise taken off, means over the frames, each in units of its frgr's error
+    and its target's noise, so that none decides. True if the blend has less than any single image at every sample count."""
     rows = {}
     for sample in apart:
         with torch.no_grad():
             kept = weights(weigh(sample["features"][None])[0], sample["trust"])
             image = (kept.unsqueeze(1) * sample["images"]).sum(0)
         frame, last = sample["frame"], lambda planes: np.moveaxis(planes.numpy(), 0, -1)
-        errors = [frame.rel_mse(last(sample["images"][k])) for k in range(len(names))] + [frame.rel_mse(last(image))]
-        # The target's own noise, taken off on average, may be more than what is left.
-        if min(errors) > frame.floor:
-            rows.setdefault(sample["spp"], []).append(errors)
-    print("| spp | frames | " + " | ".join(name or "colours" for name in names) + " | blend | over the best | worst |\n" + "|---" * (len(names) + 5) + "|")
+        errors = np.array([frame.rel_mse(last(image)) for image in (*sample["images"], image)])
+        unit = abs(errors[CANDIDATES.index("frgr")]) + 2 * frame.floor
+        rows.setdefault(sample["spp"], []).append(errors / unit)
+    print("| spp | frames | " + " | ".join(name or "colours" for name in CANDIDATES) + " | blend | over the best |\n" + "|---" * (len(CANDIDATES) + 4) + "|")
     good = bool(rows)
     for spp in sorted(rows):
-        errors = np.array(rows[spp])
-        means = np.exp(np.log(errors).mean(0))
-        ratio = means[-1] / means[:-1].min()
-        worst = (errors[:, -1] / errors[:, :-1].min(1)).max()
-        good &= ratio < 1
-        print("| %d | %d | %s | %.2f | %.2f |" % (spp, len(errors), " | ".join("%.5f" % m for m in means), ratio, worst))
+        means = np.mean(rows[spp], 0)
+        best = means[:-1].min()
+        good &= means[-1] < best
+        print("| %d | %d | %s | %.2f |" % (spp, len(rows[spp]), " | ".join("%.3f" % m for m in means), means[-1] / best))
     return good
 
 
 def test(options):
-    compared(trained(options)[0], CANDIDATES[options.kind], samples(options.frames, options.kind)[1])
+    compared(trained(options)[0], samples(options.frames)[1])
 
 
 def export(options):
     """Writes half floats, and for the tests what the network makes of them on one crop."""
-    (weigh, steps), (training, apart) = trained(options), samples(options.frames, options.kind)
-    if not compared(weigh, CANDIDATES[options.kind], apart):
+    (weigh, steps), (training, apart) = trained(options), samples(options.frames)
+    if not compared(weigh, apart):
         raise SystemExit("not exported: a single image is better")
     weigh = weigh.half().float()
     top = os.path.join(os.path.dirname(__file__), "..", "..")
     named = {f"layer{k}.{key}": value.half() for k, layer in enumerate(layer for layer in weigh if hasattr(layer, "weight"))
              for key, value in layer.state_dict().items()}
-    recipe = {"candidates": CANDIDATES[options.kind], "images": len(training), "steps": steps, "batch": BATCH, "crop": CROP,
+    recipe = {"candidates": CANDIDATES, "images": len(training), "steps": steps, "batch": BATCH, "crop": CROP,
               "rate": RATE, "seed": options.seed}
-    save_file(named, os.path.join(top, "src/reconstruct/blend", options.kind + ".safetensors"),
+    save_file(named, os.path.join(top, "src/reconstruct/blend/oidn.safetensors"),
               {"recipe": json.dumps(recipe)})
     given = apart[0]["features"][None, :, :12, :15]
     with torch.no_grad():
         made = torch.softmax(weigh(given), 1)
     vectors = {name: planes[0].permute(1, 2, 0).contiguous() for name, planes in (("input", given), ("output", made))}
-    save_file(vectors, os.path.join(top, "tests/data", f"blend-{options.kind}.safetensors"))
+    save_file(vectors, os.path.join(top, "tests/data", "blend-oidn.safetensors"))
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("action", choices=["train", "test", "export"])
-    parser.add_argument("kind", choices=list(CANDIDATES))
-    runs.arguments(parser, STEPS)
-    options = parser.parse_args()
-    {"train": train, "test": test, "export": export}[options.action](options)
+    runs.command(__doc__, STEPS, train=train, test=test, export=export)

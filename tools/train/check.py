@@ -2,8 +2,8 @@
 
     python tools/train/check.py SCENE... [--spp 256]
 
-Prints for every scene the ratio of both images' means, its standard error, and the share of 8x8 blocks that differ by more than
-four of theirs. Run from the repository's top folder after `cargo build --release`. Needs PyPI mitsuba, openimageio and numpy, and
+Prints for every scene the ratio of both images' means, its standard error, the share of 8x8 blocks that differ by more than
+four of theirs, and the share of pixels that are compared: Mitsuba's may be no numbers. Run from the repository's top folder after `cargo build --release`. Needs PyPI mitsuba, openimageio and numpy, and
 DRJIT_LIBLLVM_PATH naming libLLVM.
 """
 import argparse
@@ -19,15 +19,22 @@ import against_mitsuba
 SIZE, BLOCK, RUNS = 64, 8, 4
 
 
-def blocks(image):
-    # Mitsuba's images have pixels that are not numbers in some scenes.
+def blocks(image, known):
+    """Means of the known pixels of every block; not a number where there is none."""
     n = SIZE // BLOCK
-    return np.nanmean(image.reshape(n, BLOCK, n, BLOCK, 3), (1, 3, 4))
+    of_blocks = lambda values: values.reshape(n, BLOCK, n, BLOCK).sum((1, 3))
+    with np.errstate(invalid="ignore"):
+        return of_blocks(np.where(known, image.mean(-1), 0)) / of_blocks(known.astype(float))
 
 
 def runs(render, spp):
-    """Means of blocks, and their variances, from several independent images."""
-    made = np.array([blocks(render(seed, spp // RUNS)) for seed in range(RUNS)])
+    """Several independent images."""
+    return [render(seed, spp // RUNS) for seed in range(RUNS)]
+
+
+def means(images, known):
+    """Means of blocks, and their variances."""
+    made = np.array([blocks(image, known) for image in images])
     return made.mean(0), made.var(0, ddof=1) / RUNS
 
 
@@ -42,14 +49,20 @@ def by_fluxion(path):
 
 def main(options):
     mitsuba.set_variant("llvm_ad_rgb")
-    print("| scene | ratio of means | standard error | blocks beyond 4 |\n|---|---|---|---|")
+    print("| scene | ratio of means | standard error | blocks beyond 4 | pixels |\n|---|---|---|---|---|")
     for path in options.scenes:
-        (a, va), (b, vb) = runs(by_fluxion(path), options.spp), runs(by_mitsuba(path), options.spp)
+        ours, theirs = runs(by_fluxion(path), options.spp), runs(by_mitsuba(path), options.spp)
+        # Mitsuba's images have pixels that are not numbers in some scenes.
+        known = np.isfinite(theirs).all((0, -1))
+        (a, va), (b, vb) = means(ours, known), means(theirs, known)
+        seen = np.isfinite(a)
+        (a, va), (b, vb) = (a[seen], va[seen]), (b[seen], vb[seen])
         # Variances of few runs are rough: each block's is at least the mean one.
         deviation = np.sqrt(np.maximum(va + vb, (va + vb).mean()) + 1e-12)
         name = os.path.basename(os.path.dirname(path))
         error = np.sqrt((va + vb).sum()) / b.sum()
-        print("| %s | %.4f | %.4f | %.3f |" % (name, a.sum() / b.sum(), error, (np.abs(a - b) > 4 * deviation).mean()), flush=True)
+        row = (name, a.sum() / b.sum(), error, (np.abs(a - b) > 4 * deviation).mean(), known.mean())
+        print("| %s | %.4f | %.4f | %.3f | %.2f |" % row, flush=True)
 
 
 if __name__ == "__main__":

@@ -29,8 +29,10 @@ class Frame:
 
     def __init__(self, folder, manifest, spp):
         self.name, self.spp = manifest["name"], spp
-        self.array = np.load(os.path.join(folder, "%s_%04dspp.npy" % (self.name, spp))).astype(np.float32)
-        self.columns = manifest["channels"]
+        path = os.path.join(folder, "%s_%04dspp.npy" % (self.name, spp))
+        self.array, self.columns = np.load(path).astype(np.float32), manifest["channels"]
+        if self.array.shape[-1] != len(self.columns):
+            raise SystemExit(f"{path}: the array has other channels than its manifest names: render the frame again")
         target = np.load(os.path.join(folder, self.name + "_ref.npy")).astype(np.float32)
         self.scale = 1 / typical_luminance(self.get("", "RGB"))
         self.direct = self.radiance("direct")

@@ -3,8 +3,8 @@
     python tools/train/kernel_frames.py SCENES FOLDER --fluxion target/release/fluxion
 
 renders every scene of the folder SCENES thrice, with seeds of their own: a pilot, whose samples are kept one by one; colours with the
-differences to all 24 pixels of a window of 5x5; and a target. Sample counts, shifts and depths change from scene to scene. FOLDER then
-holds NAME.npz for each, half floats in units of the pilot's scale; what is there is kept. Needs numpy and PyPI openimageio.
+differences to all 24 pixels of a window of 5x5; and a target. Sample counts, shifts, depths and the size of the film, of whose middle
+96x96 pixels are rendered, change from scene to scene. FOLDER then holds NAME.npz for each, half floats in units of the pilot's scale; what is there is kept. Needs numpy and PyPI openimageio.
 """
 import argparse
 import glob
@@ -21,15 +21,23 @@ from frames import DARK
 from steps import HALF_PLANE
 
 SIZE, PILOT, TARGET = 96, 8, 64
+# Sides of films: textures and outlines are as coarse and as fine as in images of any size.
+FILMS = (96, 192, 384)
 COUNTS = (4, 8, 16, 32)
 # Replay traces every neighbour's path anew: samples beyond this many take too long.
 REPLAYED = 16
 LIMIT = 6e4
 
 
+def window(number):
+    """Options for the pixels of a scene that are rendered."""
+    film = FILMS[number % len(FILMS)]
+    corner = (film - SIZE) // 2
+    return ["--size", f"{film}x{film}", "--crop", f"{corner},{corner},{SIZE}x{SIZE}"]
+
+
 def render(program, scene, *arguments):
-    subprocess.run([program, "render", scene, "-q", "--size", "%dx%d" % (SIZE, SIZE), *map(str, arguments)], check=True,
-                   capture_output=True)
+    subprocess.run([program, "render", scene, "-q", *map(str, arguments)], check=True, capture_output=True)
 
 
 def recipe(number):
@@ -53,13 +61,14 @@ def samples(folder):
 def frame(program, scene, number):
     """Arrays of a scene's frame."""
     spp, shift, depth = recipe(number)
+    common = [*window(number), *depth]
     with tempfile.TemporaryDirectory() as folder:
         layers, target = os.path.join(folder, "l.exr"), os.path.join(folder, "t.exr")
         pilot = os.path.join(folder, "samples")
-        render(program, scene, "--spp", PILOT, "--seed", 3 * number, "--method", "primal", "--samples", pilot, "-o", target, *depth)
+        render(program, scene, "--spp", PILOT, "--seed", 3 * number, "--method", "primal", "--samples", pilot, "-o", target, *common)
         render(program, scene, "--spp", spp, "--seed", 3 * number + 1, "--method", "l2", "--kernel", "nearest:k=24", "--shift", shift,
-               "--layers", layers, "-o", target, *depth)
-        render(program, scene, "--spp", TARGET, "--seed", 3 * number + 2, "--method", "frgr", "-o", target, *depth)
+               "--layers", layers, "-o", target, *common)
+        render(program, scene, "--spp", TARGET, "--seed", 3 * number + 2, "--method", "frgr", "-o", target, *common)
         found, (encoded, scale) = exr.everything(layers), samples(pilot)
         rgb = lambda name: np.stack([found[name + c] for c in "RGB"]) * scale
         # The pilot's colours count, as in a render.

@@ -35,6 +35,15 @@ with_targets() {
 		--target l2 --half --layers features --method frgr --method frgr:denoiser=oidn --notes --resume
 }
 
+# Windows of 96x96 pixels in the middle of smaller and larger films, so that textures and outlines are as coarse and as fine as
+# in images of any size: of scenes whose numbers end so, at these sample counts, with the images that are blended.
+windows() {
+	corner=$((($3 - 96) / 2))
+	"$fluxion" dataset "$folder"/scenes/*["$1"]/scene.xml -o "$folder/windows-$3-$1" --spp "$2" --size "$3x$3" \
+		--crop "$corner,$corner,96x96" --reference 96 --target l2 --half --layers features --method frgr \
+		--method frgr:denoiser=oidn --method net:image=safe --notes --resume
+}
+
 # Larger frames with differences, their targets with as many samples; smaller ones of the scenes that are kept apart.
 with_differences() {
 	methods="--method l1 --method frgr --notes"
@@ -61,16 +70,21 @@ kernels)
 	"$python" tools/train/kernel_frames.py "$folder/scenes" "$folder/frames-kernels" --fluxion "$fluxion"
 	weights kernels kernels "$folder/frames-kernels"
 	;;
-net | blend)
+net)
 	with_targets 02468 even 4,16,64
 	with_targets 13579 odd 2,8,32
 	weights net net "$folder/frames-even" "$folder/frames-odd"
-	if [ "$method" = blend ]; then
-		weights blend blend-oidn oidn "$folder/frames-even" "$folder/frames-odd"
-	else
-		with_differences
-		weights differences differences "$folder/frames-whole" "$folder/frames-apart"
-	fi
+	with_differences
+	weights differences differences "$folder/frames-whole" "$folder/frames-apart"
+	;;
+blend)
+	for film in 128-02 256-46 512-8; do
+		windows "${film#*-}" 4,16,64 "${film%-*}"
+	done
+	for film in 128-13 256-5 512-79; do
+		windows "${film#*-}" 2,8,32 "${film%-*}"
+	done
+	weights blend blend "$folder"/windows-*
 	;;
 *)
 	echo "unknown method: $method" >&2

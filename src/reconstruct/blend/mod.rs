@@ -54,8 +54,7 @@ const CANDIDATE: u64 = 12;
 /// Methods, and those of their intermediate images that are candidates beside their own.
 type Candidates = &'static [(&'static str, &'static [&'static str])];
 
-const CANDIDATES: Candidates =
-    &[("frgr:denoiser=oidn", &["denoised", "level0_enhanced"]), ("net:image=safe", &["frgr"])];
+const CANDIDATES: Candidates = &[("frgr:denoiser=oidn,filter=off", &["denoised"]), ("net:image=safe", &["frgr"])];
 
 /// The trained network for these.
 const WEIGHTS: &[u8] = include_bytes!("oidn.safetensors");
@@ -165,7 +164,7 @@ mod tests {
     const SIZE: (usize, usize) = (48, 40);
 
     /// As with Open Image Denoise, whose place non-local means take.
-    const STAND_IN: Candidates = &[("frgr", &["denoised", "level0_enhanced"]), ("net:image=safe", &["frgr"])];
+    const STAND_IN: Candidates = &[("frgr:filter=off", &["denoised"]), ("net:image=safe", &["frgr"])];
 
     fn frame(truth: &Image, noise: f32, edge: f32, seed: u64) -> Frame {
         noisy(truth, Noise { color: noise, edge, distribution: Distribution::Normal }, seed)
@@ -182,10 +181,10 @@ mod tests {
     #[test]
     fn every_value_lies_among_those_of_the_candidates() {
         let frame = frame(&picture(SIZE), 0.3, 0.1, 1);
-        let [frgr, net] = ["frgr", "net:image=safe"].map(|method| solved(parse(method).unwrap().as_ref(), &frame));
-        let inner = ["denoised", "level0_enhanced"].map(|name| frgr.note(name).unwrap().clone());
-        let colors = frame.get(Layer::Color).unwrap();
-        let candidates = [&frgr.image, &inner[0], &inner[1], &net.image, &frgr.image, colors];
+        let methods = ["frgr:filter=off", "net:image=safe", "frgr"];
+        let [enhanced, net, frgr] = methods.map(|method| solved(parse(method).unwrap().as_ref(), &frame));
+        let (denoised, colors) = (enhanced.note("denoised").unwrap(), frame.get(Layer::Color).unwrap());
+        let candidates = [&enhanced.image, denoised, &net.image, &frgr.image, colors];
         for safety in [true, false] {
             let blend = solved(&Blend::new(STAND_IN, safety).unwrap(), &frame);
             for (i, value) in blend.image.data.iter().enumerate() {

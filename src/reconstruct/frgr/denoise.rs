@@ -7,7 +7,7 @@ use crate::film::{Frame, Layer};
 use crate::image::Image;
 use crate::image::nl_means::rdfc::{self, Denoised};
 use crate::image::nl_means::{Guide, Guides};
-use crate::image::oidn;
+use crate::image::oidn::{self, Features, Quality};
 use crate::reconstruct::features::Feature;
 use crate::reconstruct::inputs::Inputs;
 use crate::reconstruct::oidn::clean;
@@ -59,7 +59,10 @@ pub fn denoise(
             let options = rdfc::Options { window, symmetric: form == Form::Code, choice, rows };
             Ok(rdfc::denoise(&guides, options, &|share| (context.progress)("denoise", share)))
         }
-        Denoiser::Oidn => clean(frame, true, frame.get(Layer::Direct), context.memory).map(judged),
+        Denoiser::Oidn => {
+            let networks = (Quality::High, Features::Prefiltered(Quality::Balanced));
+            clean(frame, frame.get(Layer::Direct), networks, context.memory).map(judged)
+        }
         Denoiser::Net => parse("net:image=safe")?.reconstruct(frame, context).map(|solution| judged(solution.image)),
     }
 }

@@ -61,6 +61,7 @@ pub const METHOD: Method = Method {
             "of that image: `rdfc`, non-local means, `net`, or `oidn`, Open Image Denoise, if installed",
         ),
         parameter("enhance", "on", "whether gradients are weighted by their worth, `on` or `off`"),
+        parameter("filter", "on", "whether colours are filtered, `on`, or the enhanced image is the result, `off`"),
     ],
     make,
 };
@@ -75,6 +76,7 @@ struct Frgr {
     denoised: bool,
     denoiser: Denoiser,
     enhance: bool,
+    filtered: bool,
 }
 
 fn make(parameters: &Parameters) -> Result<Box<dyn Reconstruction>> {
@@ -85,8 +87,11 @@ fn make(parameters: &Parameters) -> Result<Box<dyn Reconstruction>> {
             features.push(kind);
         }
     }
+    let levels = parameters.get("levels", "a number from 1 to 8", |levels| (1..=8).contains(levels))?;
+    let filtered = parameters.switch("filter")?;
     Ok(Box::new(Frgr {
-        levels: parameters.get("levels", "a number from 1 to 8", |levels| (1..=8).contains(levels))?,
+        // Coarser levels guide filters only.
+        levels: if filtered { levels } else { 1 },
         radius: parameters.get("radius", "a number from 1 to 10", |radius| (1..=10).contains(radius))?,
         form: parameters.get("form", "paper, code or best", |_| true)?,
         solver: parameters.get("solver", "sweeps or exact", |_| true)?,
@@ -95,6 +100,7 @@ fn make(parameters: &Parameters) -> Result<Box<dyn Reconstruction>> {
         denoised: parameters.switch("denoised")?,
         denoiser: parameters.choice("denoiser", &["rdfc", "oidn", "net"])?.parse()?,
         enhance: parameters.switch("enhance")?,
+        filtered,
     }))
 }
 
@@ -242,6 +248,9 @@ impl Frgr {
     /// The filtered colour and its variance. `upper` is the result of the coarser level and the sum of its variances.
     fn filter(&self, this: &Prepared, guide: &Planes, upper: Option<&[Planes; 2]>, spp: f32) -> [Planes; 2] {
         let Prepared { level, denoised, .. } = this;
+        if !self.filtered {
+            return [guide.clone(), level.variance.clone()];
+        }
         let weights = self.form.weights(spp);
         let mut terms = vec![Term { value: Cow::Borrowed(guide), target: guide, weight: 1.0 }];
         if self.denoised {
