@@ -57,6 +57,8 @@ def test_limits_and_progress(scene_file):
 
 def interrupted(work):
     """Seconds that work goes on for after Ctrl-C."""
+    # Shells have background jobs ignore it.
+    heard = signal.signal(signal.SIGINT, signal.default_int_handler)
     signal.setitimer(signal.ITIMER_REAL, 0.3)
     previous = signal.signal(signal.SIGALRM, lambda *_: os.kill(os.getpid(), signal.SIGINT))
     try:
@@ -65,6 +67,7 @@ def interrupted(work):
         return time.monotonic()
     finally:
         signal.signal(signal.SIGALRM, previous)
+        signal.signal(signal.SIGINT, heard)
 
 
 def test_ctrl_c_ends_a_render_that_would_take_hours(scene_file):
