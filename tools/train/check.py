@@ -3,8 +3,8 @@
     python tools/train/check.py SCENE... [--spp 256]
 
 Prints for every scene the ratio of both images' means, its standard error, the share of 8x8 blocks that differ by more than
-four of theirs, and the share of pixels that are compared: Mitsuba's may be no numbers. Run from the repository's top folder after `cargo build --release`. Needs PyPI mitsuba, openimageio and numpy, and
-DRJIT_LIBLLVM_PATH naming libLLVM.
+four of theirs, and the share of pixels that are compared: Mitsuba's may be no numbers. Run from the repository's top folder
+after `cargo build --release`. Needs PyPI mitsuba, openimageio and numpy, and DRJIT_LIBLLVM_PATH naming libLLVM.
 """
 import argparse
 import os

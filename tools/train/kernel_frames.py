@@ -4,7 +4,8 @@
 
 renders every scene of the folder SCENES thrice, with seeds of their own: a pilot, whose samples are kept one by one; colours with the
 differences to all 24 pixels of a window of 5x5; and a target. Sample counts, shifts, depths and the size of the film, of whose middle
-96x96 pixels are rendered, change from scene to scene. FOLDER then holds NAME.npz for each, half floats in units of the pilot's scale; what is there is kept. Needs numpy and PyPI openimageio.
+96x96 pixels are rendered, change from scene to scene. FOLDER then holds NAME.npz for each, half floats in units of the pilot's scale;
+what is there is kept. Needs numpy and PyPI openimageio.
 """
 import argparse
 import glob

@@ -32,7 +32,7 @@ weights() {
 # Frames with clean targets: half of the scenes at even powers of two, half at odd ones.
 with_targets() {
 	"$fluxion" dataset "$folder"/scenes/*["$1"]/scene.xml -o "$folder/frames-$2" --spp "$3" --size 128x128 --reference 256 \
-		--target l2 --half --layers features --method frgr --method frgr:denoiser=oidn --notes --resume
+		--target l2 --half --layers features --method frgr --notes --resume
 }
 
 # Windows of 96x96 pixels in the middle of smaller and larger films, so that textures and outlines are as coarse and as fine as
