@@ -139,17 +139,16 @@ def trained(options):
 
 
 def compared(weigh, apart):
-    """Errors on the scenes kept apart, as a table: the targets' noise taken off, means over the frames, each in units of its frgr's error
-    and its target's noise, so that none decides. True if the blend has less than any single image at every sample count."""
+    """Errors on the scenes kept apart, the targets' noise taken off, as a table of means over the frames, each in units of frgr's. True if
+    the blend has less than any single image at every sample count."""
     rows = {}
     for sample in apart:
         with torch.no_grad():
             kept = weights(weigh(sample["features"][None])[0], sample["trust"])
             image = (kept.unsqueeze(1) * sample["images"]).sum(0)
         frame, last = sample["frame"], lambda planes: np.moveaxis(planes.numpy(), 0, -1)
-        errors = np.array([frame.rel_mse(last(image)) for image in (*sample["images"], image)])
-        unit = abs(errors[CANDIDATES.index("frgr")]) + 2 * frame.floor
-        rows.setdefault(sample["spp"], []).append(errors / unit)
+        errors = [frame.rel_mse(last(image)) for image in (*sample["images"], image)]
+        rows.setdefault(sample["spp"], []).append(frame.comparable(errors, errors[CANDIDATES.index("frgr")]))
     print("| spp | frames | " + " | ".join(name or "colours" for name in CANDIDATES) + " | blend | over the best |\n" + "|---" * (len(CANDIDATES) + 4) + "|")
     good = bool(rows)
     for spp in sorted(rows):

@@ -61,6 +61,10 @@ class Frame:
         error = (image - self.target) ** 2 - noise
         return float((error * scale ** 2 / ((whole * scale) ** 2 + EPSILON)).mean())
 
+    def comparable(self, errors, base):
+        """Errors of images in units of one of them and of the target's noise, so that of many frames none decides their mean."""
+        return np.array(errors) / (abs(base) + 2 * self.floor)
+
 
 def manifest(folder, name):
     with open(os.path.join(folder, name + ".json")) as file:

@@ -21,7 +21,9 @@ import exr
 from frames import DARK
 from steps import HALF_PLANE
 
-SIZE, PILOT, TARGET = 96, 8, 64
+SIZE, PILOT = 96, 8
+# Samples of targets: those of direct light, which has the least noise to tell from theirs, are more.
+TARGET, DIRECT_TARGET = 64, 192
 # Sides of films: textures and outlines are as coarse and as fine as in images of any size.
 FILMS = (96, 192, 384)
 COUNTS = (4, 8, 16, 32)
@@ -42,10 +44,10 @@ def render(program, scene, *arguments):
 
 
 def recipe(number):
-    """Sample count, shift and depth of a scene."""
+    """Sample count, shift, options of depth and the target's sample count of a scene."""
     spp = COUNTS[number % len(COUNTS)]
     shift = "replay" if number // 4 % 2 and spp <= REPLAYED else "reconnect"
-    return spp, shift, ["--max-depth", 2] if number // 8 % 4 == 0 else []
+    return spp, shift, *((["--max-depth", 2], DIRECT_TARGET) if number // 8 % 4 == 0 else ([], TARGET))
 
 
 def samples(folder):
@@ -61,7 +63,7 @@ def samples(folder):
 
 def frame(program, scene, number):
     """Arrays of a scene's frame."""
-    spp, shift, depth = recipe(number)
+    spp, shift, depth, of_target = recipe(number)
     common = [*window(number), *depth]
     with tempfile.TemporaryDirectory() as folder:
         layers, target = os.path.join(folder, "l.exr"), os.path.join(folder, "t.exr")
@@ -69,7 +71,7 @@ def frame(program, scene, number):
         render(program, scene, "--spp", PILOT, "--seed", 3 * number, "--method", "primal", "--samples", pilot, "-o", target, *common)
         render(program, scene, "--spp", spp, "--seed", 3 * number + 1, "--method", "l2", "--kernel", "nearest:k=24", "--shift", shift,
                "--layers", layers, "-o", target, *common)
-        render(program, scene, "--spp", TARGET, "--seed", 3 * number + 2, "--method", "frgr", "-o", target, *common)
+        render(program, scene, "--spp", of_target, "--seed", 3 * number + 2, "--method", "frgr", "-o", target, *common)
         found, (encoded, scale) = exr.everything(layers), samples(pilot)
         rgb = lambda name: np.stack([found[name + c] for c in "RGB"]) * scale
         # The pilot's colours count, as in a render.

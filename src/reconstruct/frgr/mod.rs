@@ -90,7 +90,7 @@ fn make(parameters: &Parameters) -> Result<Box<dyn Reconstruction>> {
     let levels = parameters.get("levels", "a number from 1 to 8", |levels| (1..=8).contains(levels))?;
     let filtered = parameters.switch("filter")?;
     Ok(Box::new(Frgr {
-        // Coarser levels guide filters only.
+        // Coarser levels guide the filter only.
         levels: if filtered { levels } else { 1 },
         radius: parameters.get("radius", "a number from 1 to 10", |radius| (1..=10).contains(radius))?,
         form: parameters.get("form", "paper, code or best", |_| true)?,
@@ -167,15 +167,21 @@ impl Reconstruction for Frgr {
             let this = levels.pop().expect("as many as are counted");
             let enhanced = self.enhance(&this, inputs.spp);
             notes.add(&format!("level{k}_enhanced"), &enhanced.image, inputs.scale);
-            (context.progress)("filter", 1.0 - 0.5 * left);
-            let filtered = self.filter(&this, &enhanced.image, upper.as_ref(), inputs.spp);
-            notes.add(&format!("level{k}_filtered"), &filtered[0], inputs.scale);
-            if k == 0 {
-                let image = filtered[0].to_image(frame.width, frame.height, 1.0 / inputs.scale);
-                let error = error_image(&this, &enhanced, &inputs, frame);
-                return Ok(Solution { image, alpha: None, error: Some(error), notes: notes.notes });
+            let solution = |image: &Planes, notes: Notes| Solution {
+                image: image.to_image(frame.width, frame.height, 1.0 / inputs.scale),
+                alpha: None,
+                error: Some(error_image(&this, &enhanced, &inputs, frame)),
+                notes: notes.notes,
+            };
+            if !self.filtered {
+                return Ok(solution(&enhanced.image, notes));
             }
-            let [image, variance] = filtered;
+            (context.progress)("filter", 1.0 - 0.5 * left);
+            let [image, variance] = self.filter(&this, &enhanced.image, upper.as_ref(), inputs.spp);
+            notes.add(&format!("level{k}_filtered"), &image, inputs.scale);
+            if k == 0 {
+                return Ok(solution(&image, notes));
+            }
             upper = Some([choices[k - 1].up(&image), choices[k - 1].up_variance(&variance.sum())]);
         }
         unreachable!("there is a level 0")
@@ -248,9 +254,6 @@ impl Frgr {
     /// The filtered colour and its variance. `upper` is the result of the coarser level and the sum of its variances.
     fn filter(&self, this: &Prepared, guide: &Planes, upper: Option<&[Planes; 2]>, spp: f32) -> [Planes; 2] {
         let Prepared { level, denoised, .. } = this;
-        if !self.filtered {
-            return [guide.clone(), level.variance.clone()];
-        }
         let weights = self.form.weights(spp);
         let mut terms = vec![Term { value: Cow::Borrowed(guide), target: guide, weight: 1.0 }];
         if self.denoised {
