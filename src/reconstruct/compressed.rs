@@ -34,7 +34,7 @@ pub fn given(inputs: &Inputs, images: &[&Planes], more: &[&Planes], variance: Op
     let [[dx, of_dx], [dy, of_dy]] = [inputs.gradient(0)?, inputs.gradient(1)?];
     let deviation = |variance: &Planes| mean(&variance.map(|variance| variance.sqrt().min(MOST_NOISE)));
     let noise = variance.map(|variance| [variance, &of_dx, &of_dy].map(deviation));
-    let samples = libm::log2f(inputs.spp) / 4.0;
+    let samples = inputs.told_samples();
     let of_images = |images: &[&Planes]| images.iter().map(|image| image.channels()).sum::<usize>();
     let of_noise = if noise.is_some() { 4 } else { 0 };
     let channels = of_images(images) + of_images(more) + FEATURES + NOISELESS_DIFFERENCES + of_noise;

@@ -14,6 +14,9 @@ use crate::solve::graph::Quad;
 /// Least variance of a colour, as a share of the mean variance of the pixels around it.
 pub const FLOOR: f32 = 0.5;
 
+/// Largest number of samples of a pixel that networks were trained with.
+pub const TRAINED_SAMPLES: f32 = 64.0;
+
 /// Least typical luminance: the square of one over it is still a float.
 const LEAST_LUMINANCE: f32 = 1e-18;
 
@@ -40,6 +43,11 @@ impl<'a> Inputs<'a> {
         let spp = (samples.iter().map(|&n| f64::from(n)).sum::<f64>() / samples.len() as f64).max(1.0) as f32;
         let (width, height) = (frame.width.next_multiple_of(multiple), frame.height.next_multiple_of(multiple));
         Ok(Self { frame, width, height, scale, spp })
+    }
+
+    /// What networks are told of the number of samples: its logarithm, and of more than [`TRAINED_SAMPLES`] that of these.
+    pub fn told_samples(&self) -> f32 {
+        libm::log2f(self.spp.min(TRAINED_SAMPLES)) / 4.0
     }
 
     /// A layer times `scale`.
@@ -195,6 +203,16 @@ fn typical_luminance(color: &Image) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn networks_are_told_of_no_more_samples_than_they_were_trained_with() {
+        for (samples, told) in [(1.0, 0.0), (16.0, 1.0), (64.0, 1.5), (4096.0, 1.5)] {
+            let mut frame = Frame::new(2, 1);
+            frame.set(Layer::Color, Image::new(2, 1, 3));
+            frame.set(Layer::Samples, Image { data: vec![samples; 2], ..Image::new(2, 1, 1) });
+            assert_eq!(Inputs::new(&frame, 1).unwrap().told_samples(), told, "{samples}");
+        }
+    }
 
     #[test]
     fn mirrored_differences_are_those_of_the_mirrored_image() {

@@ -66,7 +66,7 @@ def prepare(frame):
         torch.asinh(3 * (luminance - middle) / unit), torch.asinh(3 * apart / unit), torch.asinh(apart / deviation),
         torch.asinh(bias / noise),
         0.5 * torch.log(variance + 1e-7) - torch.log(unit), torch.log(unit), 0.5 * torch.log(claimed + 1e-7) - torch.log(unit),
-        planes(frame.get("albedo", "RGB")).mean(0, keepdim=True), torch.full_like(unit, np.log2(frame.spp) / 4)])
+        planes(frame.get("albedo", "RGB")).mean(0, keepdim=True), torch.full_like(unit, frame.told_samples())])
     trust = residual.trust(noise, bias, frame.spp)
     trust[-1] = 1
     frame.array = None

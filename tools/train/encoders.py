@@ -75,7 +75,7 @@ def sampled(frame):
                           planes(np.minimum(depth / far, 1))])
     noise = {name: compress(planes(frame.radiance(name)).mean(0, keepdim=True)) for name in ("sigma", "dx_sigma", "dy_sigma")}
     return {"colour": planes(frame.radiance("")), "dx": planes(frame.radiance("dx")), "dy": planes(frame.radiance("dy")),
-            "features": features, "spp": torch.full_like(features[:1], np.log2(frame.spp) / 4), "target": planes(frame.target)} | noise
+            "features": features, "spp": torch.full_like(features[:1], frame.told_samples()), "target": planes(frame.target)} | noise
 
 
 def whole(parts, layout):

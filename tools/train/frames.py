@@ -8,6 +8,8 @@ import torch
 
 # Least typical luminance, and regularisation of relMSE.
 DARK, EPSILON = 1e-18, 0.01
+# Networks are not told of more samples than they were trained with.
+TRAINED_SAMPLES = 64
 # Endings of the names of intermediate images.
 INNER = ("_denoised", "_level0_enhanced")
 
@@ -40,6 +42,10 @@ class Frame:
         self.target = target[..., :3] * self.scale - self.direct
         self.difference = target[..., 3:6] * self.scale
         self.floor = manifest["floor"]
+
+    def told_samples(self):
+        """What networks are told of the number of samples, as src/reconstruct/inputs.rs has it."""
+        return np.log2(min(self.spp, TRAINED_SAMPLES)) / 4
 
     def get(self, name, channels):
         prefix = name + "." if name else ""

@@ -88,7 +88,7 @@ def features(frame, images):
                       relative(claimed.clamp(min=0).mean(0, keepdim=True)), planes(frame.get("albedo", "RGB")),
                       planes(frame.get("normal", "XYZ")), depth / (depth + depth.mean() + 1e-9),
                       sigma("albedo_sigma", "RGB"), sigma("normal_sigma", "XYZ"), sigma("depth_sigma", "Z") / (depth + depth.mean() + 1e-9),
-                      torch.full_like(unit, np.log2(frame.spp) / 4)])
+                      torch.full_like(unit, frame.told_samples())])
 
 
 def samples(folders):

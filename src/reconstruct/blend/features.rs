@@ -49,11 +49,10 @@ impl Evidence {
         Ok(Self { luminance, residual, bias, variance, residual_noise, noise, claimed, albedo })
     }
 
-    /// Features of the network: four for every candidate, then five of the pixel.
-    pub fn features(&self, spp: f32) -> Tensor {
+    /// Features of the network: four for every candidate, then five of the pixel, of which `samples` is the last.
+    pub fn features(&self, samples: f32) -> Tensor {
         let (count, side) = (self.luminance.channels(), (2 * RESIDUAL + 1) as f32);
         let (width, height) = (self.luminance.width, self.luminance.height);
-        let samples = libm::log2f(spp) / 4.0;
         Tensor::from_fn(width, height, 4 * count + 5, |x, y, pixel| {
             let (x, y) = (x as isize, y as isize);
             let at = |planes: &Planes| planes.at(0, x, y);

@@ -127,7 +127,7 @@ impl Reconstruction for Blend {
         let images: Vec<_> = candidates.iter().map(|image| inputs.mirrored(image, inputs.scale)).collect();
         drop(candidates);
         let evidence = Evidence::new(&inputs, &images, best)?;
-        let weights = self.network.weights(&evidence.features(inputs.spp));
+        let weights = self.network.weights(&evidence.features(inputs.told_samples()));
         let kept = if self.safety { evidence.safe(weights, inputs.spp) } else { weights };
         let notes = if context.notes { notes(&kept, &inputs) } else { Vec::new() };
         Ok(Solution { image: mixed(&images, &kept, &inputs), alpha: None, error, notes })

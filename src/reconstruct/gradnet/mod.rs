@@ -18,7 +18,7 @@ use std::path::Path;
 
 use self::means::with_means;
 use super::compressed::{DIFFERENCES, FEATURES, NOISELESS_DIFFERENCES, decompress, given};
-use super::inputs::{Inputs, check_memory};
+use super::inputs::{Inputs, TRAINED_SAMPLES, check_memory};
 use super::residual::{estimated_error, noise, pulled_back, squared_error, trust, windowed};
 use super::{Context, EdgeTrust, Method, Note, Parameter, Parameters, Reconstruction, Solution, Traits, parse};
 use crate::error::{Error, Result, SourceLoc};
@@ -51,9 +51,6 @@ const WEIGHTS: &[u8] = include_bytes!("own.safetensors");
 
 /// Bytes held for every pixel besides the frame, and while the network works on a band: an upper bound.
 const BYTES: u64 = 700;
-
-/// Largest number of samples that the network was trained for.
-const TRAINED: f32 = 64.0;
 
 /// Channels that the encoders of data and gradients take and what comes out: as printed, and with noise, number of samples and `l1`.
 const PRINTED: ([usize; 2], usize) = ([3 + FEATURES, NOISELESS_DIFFERENCES], 3);
@@ -128,7 +125,7 @@ impl Reconstruction for Solver {
         let around = windowed(&noise);
         let image = match &l1 {
             Some(l1) => {
-                let share = (TRAINED / inputs.spp).min(1.0);
+                let share = (TRAINED_SAMPLES / inputs.spp).min(1.0);
                 let trust = trust(&around, &squared_error(&color, &noise, &image), inputs.spp);
                 pulled_back(&image, l1, &trust.map(|trust| share * trust))
             }
