@@ -22,6 +22,7 @@ from torch.nn import functional as F
 
 import runs
 import selection
+from kernel_frames import recipe
 from ssim import ms_ssim
 from steps import CROSS, HALF_PLANE, STEPS, forward
 from unet import UNet, act
@@ -255,7 +256,7 @@ def train(options):
 
 
 def compared(net, apart):
-    """SMAPE and 1 - MS-SSIM on the scenes kept apart, over those of the cross with uniform weights, by sample count. True if SMAPE is
+    """SMAPE and 1 - MS-SSIM on the scenes kept apart, over those of the cross with uniform weights, by light and shift. True if SMAPE is
     less for both kinds of neighbours."""
     rows = {}
     with torch.no_grad():
@@ -269,16 +270,19 @@ def compared(net, apart):
             def errors(present, weights):
                 image = solved(colour, edges, present, weights, TEST_ITERATIONS)
                 return [float(smape(image * scale, target * scale)), 1 - float(ms_ssim(shown(image, scale)[None], shown(target, scale)[None]))]
-            made = [errors(*case) for case in ((cross, ones), (cross, weights), (chosen, ones), (chosen, weights))]
+            cases = (cross, ones), (cross, weights), (chosen, weights), (chosen, ones), (torch.ones_like(scores), ones)
+            made = [errors(*case) for case in cases]
             if min(made[0]) > 0:
-                rows.setdefault(frame.spp, []).append([*np.array(made[1:]).ravel() / np.tile(made[0], 3), float(chosen.sum(0).mean())])
-    print("| spp | frames | cross, learned weights | learned, uniform | learned, learned weights | degree |\n|---|---|---|---|---|---|")
-    for spp in sorted(rows):
-        mean = np.exp(np.log(rows[spp]).mean(0))
-        print("| %d | %d | %.3f %.3f | %.3f %.3f | %.3f %.3f | %.2f |" % (spp, len(rows[spp]), *mean))
-    means = np.exp(np.log(np.concatenate([np.array(row) for row in rows.values()])).mean(0)) if rows else np.ones(7)
-    print("all: " + " ".join("%.3f" % mean for mean in means), flush=True)
-    return means[0] < 1 and means[4] < 1
+                _, shift, direct, _ = recipe(int(frame.name))
+                ratios = np.array(made[1:]).ravel() / np.tile(made[0], len(cases) - 1)
+                rows.setdefault(("direct light" if direct else "path tracing", shift), []).append([*ratios, float(chosen.sum(0).mean())])
+    print("| light, shift | frames | cross, learned weights | learned, learned weights | learned, uniform | all 24, uniform | degree |")
+    print("|---|---|---|---|---|---|---|")
+    for kind in sorted(rows):
+        mean = np.exp(np.log(rows[kind]).mean(0))
+        print("| %s, %s | %d | %.3f, %.3f | %.3f, %.3f | %.3f, %.3f | %.3f, %.3f | %.2f |" % (*kind, len(rows[kind]), *mean), flush=True)
+    means = np.exp(np.log(np.concatenate(list(rows.values()))).mean(0)) if rows else np.ones(3)
+    return means[0] < 1 and means[2] < 1
 
 
 def test(options):
