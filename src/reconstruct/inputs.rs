@@ -45,7 +45,7 @@ impl<'a> Inputs<'a> {
         Ok(Self { frame, width, height, scale, spp })
     }
 
-    /// What networks are told of the number of samples: its logarithm, and of more than [`TRAINED_SAMPLES`] that of these.
+    /// Number of samples as networks are told of it: its logarithm, of more than [`TRAINED_SAMPLES`] that of these.
     pub fn told_samples(&self) -> f32 {
         libm::log2f(self.spp.min(TRAINED_SAMPLES)) / 4.0
     }
