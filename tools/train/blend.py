@@ -149,14 +149,8 @@ def compared(weigh, apart):
         frame, last = sample["frame"], lambda planes: np.moveaxis(planes.numpy(), 0, -1)
         errors = [frame.rel_mse(last(image)) for image in (*sample["images"], image)]
         rows.setdefault(sample["spp"], []).append(frame.comparable(errors, errors[CANDIDATES.index("frgr")]))
-    print("| spp | frames | " + " | ".join(name or "colours" for name in CANDIDATES) + " | blend | over the best |\n" + "|---" * (len(CANDIDATES) + 4) + "|")
-    good = bool(rows)
-    for spp in sorted(rows):
-        means = np.mean(rows[spp], 0)
-        best = means[:-1].min()
-        good &= means[-1] < best
-        print("| %d | %d | %s | %.2f |" % (spp, len(rows[spp]), " | ".join("%.3f" % m for m in means), means[-1] / best))
-    return good
+    others = [name or "colours" for name in CANDIDATES]
+    return frames.holds(rows, [*others, "blend"], "blend", others)
 
 
 def test(options):

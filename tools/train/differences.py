@@ -85,13 +85,7 @@ def compared(made, apart):
         last = lambda image: np.moveaxis(image.numpy(), 0, -1)
         errors = [frame.rel_mse(last(image)) for image in (parts["frgr"], own, beside, 0.5 * (own + beside))]
         rows.setdefault(frame.spp, []).append(frame.comparable(errors, errors[0]))
-    good = bool(rows)
-    print("| spp | frames | frgr | differences | images | mean of both |\n|---|---|---|---|---|---|")
-    for spp in sorted(rows):
-        means = np.mean(rows[spp], 0)
-        good &= means[1] < means[0]
-        print("| %d | %d | %.3f | %.3f | %.3f | %.3f |" % (spp, len(rows[spp]), *means))
-    return good
+    return frames.holds(rows, ["frgr", "differences", "images", "mean of both"], "differences", ["frgr"])
 
 
 def test(options):

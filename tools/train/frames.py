@@ -72,6 +72,19 @@ class Frame:
         return np.array(errors) / (abs(base) + 2 * self.floor)
 
 
+def holds(rows, columns, made, others):
+    """Prints the means of `rows`, lists of errors by sample count, with the column `made` over the least of the columns `others`. True if
+    that is below one at every sample count."""
+    print("| spp | frames | " + " | ".join(columns) + " | ratio |\n" + "|---" * (len(columns) + 3) + "|")
+    good = bool(rows)
+    for spp in sorted(rows):
+        means = dict(zip(columns, np.mean(rows[spp], 0)))
+        ratio = means[made] / min(means[other] for other in others)
+        good &= ratio < 1
+        print("| %d | %d | %s | %.2f |" % (spp, len(rows[spp]), " | ".join("%.3f" % mean for mean in means.values()), ratio), flush=True)
+    return bool(good)
+
+
 def manifest(folder, name):
     with open(os.path.join(folder, name + ".json")) as file:
         return json.load(file)

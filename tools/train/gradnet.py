@@ -178,13 +178,7 @@ def test(options):
         errors = [frame.rel_mse(frame.image(method)) for method in methods]
         errors += [frame.rel_mse(last(image)) for image in solved(net, prepared, options.preset)]
         rows.setdefault(frame.spp, []).append(frame.comparable(errors, errors[methods.index("frgr")]))
-    good = bool(rows)
-    print("| spp | frames | " + " | ".join(methods) + " | uncorrected | gradnet |\n" + "|---" * (len(methods) + 4) + "|")
-    for spp in sorted(rows):
-        means = np.mean(rows[spp], 0)
-        print("| %d | %d | %s |" % (spp, len(rows[spp]), " | ".join("%.3f" % mean for mean in means)))
-        good &= means[-1] < min(means[methods.index(method)] for method in SOLVERS)
-    return good
+    return frames.holds(rows, [*methods, "uncorrected", "gradnet"], "gradnet", SOLVERS)
 
 
 def export(options):

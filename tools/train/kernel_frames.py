@@ -44,10 +44,10 @@ def render(program, scene, *arguments):
 
 
 def recipe(number):
-    """Sample count, shift, options of depth and the target's sample count of a scene."""
+    """Sample count and shift of a scene, and whether it is of direct light alone."""
     spp = COUNTS[number % len(COUNTS)]
     shift = "replay" if number // 4 % 2 and spp <= REPLAYED else "reconnect"
-    return spp, shift, *((["--max-depth", 2], DIRECT_TARGET) if number // 8 % 4 == 0 else ([], TARGET))
+    return spp, shift, number // 8 % 4 == 0
 
 
 def samples(folder):
@@ -63,15 +63,15 @@ def samples(folder):
 
 def frame(program, scene, number):
     """Arrays of a scene's frame."""
-    spp, shift, depth, of_target = recipe(number)
-    common = [*window(number), *depth]
+    spp, shift, direct = recipe(number)
+    common = [*window(number), *(["--max-depth", 2] if direct else [])]
     with tempfile.TemporaryDirectory() as folder:
         layers, target = os.path.join(folder, "l.exr"), os.path.join(folder, "t.exr")
         pilot = os.path.join(folder, "samples")
         render(program, scene, "--spp", PILOT, "--seed", 3 * number, "--method", "primal", "--samples", pilot, "-o", target, *common)
         render(program, scene, "--spp", spp, "--seed", 3 * number + 1, "--method", "l2", "--kernel", "nearest:k=24", "--shift", shift,
                "--layers", layers, "-o", target, *common)
-        render(program, scene, "--spp", of_target, "--seed", 3 * number + 2, "--method", "frgr", "-o", target, *common)
+        render(program, scene, "--spp", DIRECT_TARGET if direct else TARGET, "--seed", 3 * number + 2, "--method", "frgr", "-o", target, *common)
         found, (encoded, scale) = exr.everything(layers), samples(pilot)
         rgb = lambda name: np.stack([found[name + c] for c in "RGB"]) * scale
         # The pilot's colours count, as in a render.

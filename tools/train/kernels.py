@@ -273,7 +273,7 @@ def compared(net, apart):
             cases = (cross, ones), (cross, weights), (chosen, weights), (chosen, ones), (torch.ones_like(scores), ones)
             made = [errors(*case) for case in cases]
             if min(made[0]) > 0:
-                _, shift, direct, _ = recipe(int(frame.name))
+                _, shift, direct = recipe(int(frame.name))
                 ratios = np.array(made[1:]).ravel() / np.tile(made[0], len(cases) - 1)
                 rows.setdefault(("direct light" if direct else "path tracing", shift), []).append([*ratios, float(chosen.sum(0).mean())])
     print("| light, shift | frames | cross, learned weights | learned, learned weights | learned, uniform | all 24, uniform | degree |")

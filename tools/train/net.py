@@ -180,13 +180,7 @@ def compared(net, apart):
         frame, last = sample["frame"], lambda planes: np.moveaxis(planes.float().numpy(), 0, -1)
         errors = [frame.rel_mse(last(sample["images"][0])), frame.rel_mse(last(image))]
         rows.setdefault(sample["spp"], []).append(frame.comparable(errors, errors[0]))
-    good = bool(rows)
-    print("| spp | frames | frgr | net | ratio |\n|---|---|---|---|---|")
-    for spp in sorted(rows):
-        before, after = np.mean(rows[spp], 0)
-        good &= after < before
-        print("| %d | %d | %.3f | %.3f | %.2f |" % (spp, len(rows[spp]), before, after, after / before))
-    return good
+    return frames.holds(rows, ["frgr", "net"], "net", ["frgr"])
 
 
 def test(options):
