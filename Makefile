@@ -44,10 +44,10 @@ wheel: packages
 	python/build target/wheels
 	python/check target/wheels target/release/fluxion
 
-# Small renders under valgrind, which lacks some vector instructions: without them.
+# Small renders under valgrind.
 memcheck: packages
 	@sh .ci/packages valgrind
-	RUSTFLAGS="--cfg baseline" cargo build --release --target-dir target/memcheck
+	cargo build --release
 	tools/memcheck/run
 
 # Weights of learned methods from nothing, in training/: hours, resumable. Building and using Fluxion needs none of it.

@@ -133,21 +133,102 @@ RTCRay to_rtc(const FluxionRay *ray) {
   return r;
 }
 
-void to_rtc(const FluxionRays *rays, RTCRay16 *r, int *valid) {
-  std::memcpy(r->org_x, rays->origin[0], sizeof r->org_x);
-  std::memcpy(r->org_y, rays->origin[1], sizeof r->org_y);
-  std::memcpy(r->org_z, rays->origin[2], sizeof r->org_z);
-  std::memcpy(r->dir_x, rays->direction[0], sizeof r->dir_x);
-  std::memcpy(r->dir_y, rays->direction[1], sizeof r->dir_y);
-  std::memcpy(r->dir_z, rays->direction[2], sizeof r->dir_z);
-  std::memcpy(r->tfar, rays->t_far, sizeof r->tfar);
-  std::memcpy(valid, rays->active, sizeof rays->active);
-  for (int i = 0; i < FLUXION_PACKET; ++i) {
-    r->tnear[i] = 0.0f;
+/* Embree's packets of N rays. */
+template <int N> struct Packet;
+
+#define FLUXION_PACKET_OF(N)                            \
+  template <> struct Packet<N> {                        \
+    using Ray = RTCRay##N;                              \
+    using RayHit = RTCRayHit##N;                        \
+    static constexpr auto intersect = rtcIntersect##N;  \
+    static constexpr auto occluded = rtcOccluded##N;    \
+  };
+FLUXION_PACKET_OF(4)
+FLUXION_PACKET_OF(8)
+FLUXION_PACKET_OF(16)
+#undef FLUXION_PACKET_OF
+
+template <class T, int N> void copy(T (&to)[N], const T *from) { std::memcpy(to, from, sizeof to); }
+
+template <class T, int N> void copy(T *to, const T (&from)[N]) { std::memcpy(to, from, sizeof from); }
+
+/* Copies N rays from `first` on; returns whether any is active. The interval of inactive ones is empty: where Embree has
+ * no packets of this width of its own, it ignores `valid`. */
+template <int N> bool to_rtc(const FluxionRays *rays, int first, typename Packet<N>::Ray *r, int (&valid)[N]) {
+  copy(r->org_x, rays->origin[0] + first);
+  copy(r->org_y, rays->origin[1] + first);
+  copy(r->org_z, rays->origin[2] + first);
+  copy(r->dir_x, rays->direction[0] + first);
+  copy(r->dir_y, rays->direction[1] + first);
+  copy(r->dir_z, rays->direction[2] + first);
+  const uint32_t *active = rays->active + first;
+  const float *t_far = rays->t_far + first;
+  uint32_t any = 0;
+  for (int i = 0; i < N; ++i) {
+    any |= active[i];
+    valid[i] = static_cast<int>(active[i]);
+    r->tnear[i] = active[i] ? 0.0f : std::numeric_limits<float>::infinity();
+    r->tfar[i] = active[i] ? t_far[i] : -std::numeric_limits<float>::infinity();
     r->time[i] = 0.0f;
     r->mask[i] = 0xffffffffu;
     r->id[i] = 0;
     r->flags[i] = 0;
+  }
+  return any != 0;
+}
+
+template <int N> void intersect(RTCScene scene, const FluxionRays *rays, bool coherent, FluxionHits *hits) {
+#if FLUXION_EMBREE_MAJOR >= 4
+  RTCIntersectArguments arguments;
+  rtcInitIntersectArguments(&arguments);
+  if (coherent) arguments.flags = RTC_RAY_QUERY_FLAG_COHERENT;
+#else
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  if (coherent) context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+#endif
+  for (int first = 0; first < FLUXION_PACKET; first += N) {
+    typename Packet<N>::RayHit query;
+    alignas(4 * N) int valid[N];
+    const bool any = to_rtc<N>(rays, first, &query.ray, valid);
+    /* What rays that meet nothing leave there is copied, too. */
+    std::memset(&query.hit, 0, sizeof query.hit);
+    for (int i = 0; i < N; ++i) {
+      query.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
+      query.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
+    }
+    if (any) {
+#if FLUXION_EMBREE_MAJOR >= 4
+      Packet<N>::intersect(valid, scene, &query, &arguments);
+#else
+      Packet<N>::intersect(valid, scene, &context, &query);
+#endif
+    }
+    copy(hits->t + first, query.ray.tfar);
+    copy(hits->u + first, query.hit.u);
+    copy(hits->v + first, query.hit.v);
+    copy(hits->geometry + first, query.hit.geomID);
+    copy(hits->primitive + first, query.hit.primID);
+    copy(hits->instance + first, query.hit.instID[0]);
+  }
+}
+
+template <int N> void occluded(RTCScene scene, const FluxionRays *rays, uint32_t *blocked) {
+#if FLUXION_EMBREE_MAJOR < 4
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+#endif
+  for (int first = 0; first < FLUXION_PACKET; first += N) {
+    typename Packet<N>::Ray query;
+    alignas(4 * N) int valid[N];
+    if (to_rtc<N>(rays, first, &query, valid)) {
+#if FLUXION_EMBREE_MAJOR >= 4
+      Packet<N>::occluded(valid, scene, &query, nullptr);
+#else
+      Packet<N>::occluded(valid, scene, &context, &query);
+#endif
+    }
+    for (int i = 0; i < N; ++i) blocked[first + i] = valid[i] && query.tfar[i] < 0.0f ? 0xffffffffu : 0;
   }
 }
 
@@ -250,45 +331,23 @@ bool fluxion_occluded(void *scene, const FluxionRay *ray) {
   return query.tfar < 0.0f;
 }
 
-void fluxion_intersect_packet(void *scene, const FluxionRays *rays, bool coherent, FluxionHits *hits) {
-  RTCRayHit16 query;
-  alignas(64) int valid[FLUXION_PACKET];
-  to_rtc(rays, &query.ray, valid);
-  /* What rays that meet nothing leave there is copied, too. */
-  std::memset(&query.hit, 0, sizeof query.hit);
-  for (int i = 0; i < FLUXION_PACKET; ++i) {
-    query.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
-    query.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
-  }
-#if FLUXION_EMBREE_MAJOR >= 4
-  RTCIntersectArguments arguments;
-  rtcInitIntersectArguments(&arguments);
-  if (coherent) arguments.flags = RTC_RAY_QUERY_FLAG_COHERENT;
-  rtcIntersect16(valid, scene_of(scene), &query, &arguments);
-#else
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  if (coherent) context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
-  rtcIntersect16(valid, scene_of(scene), &context, &query);
-#endif
-  std::memcpy(hits->t, query.ray.tfar, sizeof hits->t);
-  std::memcpy(hits->u, query.hit.u, sizeof hits->u);
-  std::memcpy(hits->v, query.hit.v, sizeof hits->v);
-  std::memcpy(hits->geometry, query.hit.geomID, sizeof hits->geometry);
-  std::memcpy(hits->primitive, query.hit.primID, sizeof hits->primitive);
-  std::memcpy(hits->instance, query.hit.instID[0], sizeof hits->instance);
+int fluxion_packet_width(void *device) {
+  if (rtcGetDeviceProperty(device_of(device), RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED)) return 16;
+  return rtcGetDeviceProperty(device_of(device), RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED) ? 8 : 4;
 }
 
-void fluxion_occluded_packet(void *scene, const FluxionRays *rays, uint32_t blocked[FLUXION_PACKET]) {
-  RTCRay16 query;
-  alignas(64) int valid[FLUXION_PACKET];
-  to_rtc(rays, &query, valid);
-#if FLUXION_EMBREE_MAJOR >= 4
-  rtcOccluded16(valid, scene_of(scene), &query, nullptr);
-#else
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  rtcOccluded16(valid, scene_of(scene), &context, &query);
-#endif
-  for (int i = 0; i < FLUXION_PACKET; ++i) blocked[i] = valid[i] && query.tfar[i] < 0.0f ? 0xffffffffu : 0;
+void fluxion_intersect_packet(void *scene, int width, const FluxionRays *rays, bool coherent, FluxionHits *hits) {
+  switch (width) {
+    case 16: return intersect<16>(scene_of(scene), rays, coherent, hits);
+    case 8: return intersect<8>(scene_of(scene), rays, coherent, hits);
+    default: return intersect<4>(scene_of(scene), rays, coherent, hits);
+  }
+}
+
+void fluxion_occluded_packet(void *scene, int width, const FluxionRays *rays, uint32_t blocked[FLUXION_PACKET]) {
+  switch (width) {
+    case 16: return occluded<16>(scene_of(scene), rays, blocked);
+    case 8: return occluded<8>(scene_of(scene), rays, blocked);
+    default: return occluded<4>(scene_of(scene), rays, blocked);
+  }
 }

@@ -89,10 +89,12 @@ void fluxion_scene_release(void *scene);
 
 bool fluxion_intersect(void *scene, const FluxionRay *ray, FluxionHit *hit);
 bool fluxion_occluded(void *scene, const FluxionRay *ray);
+/* The largest number of rays, 4, 8 or 16, that the device traces as one packet; packets are traced in parts of it. */
+int fluxion_packet_width(void *device);
 /* `coherent`: the rays start close together and run side by side, as those of a camera. */
-void fluxion_intersect_packet(void *scene, const FluxionRays *rays, bool coherent, FluxionHits *hits);
+void fluxion_intersect_packet(void *scene, int width, const FluxionRays *rays, bool coherent, FluxionHits *hits);
 /* `blocked` gets all bits of a blocked ray's word. */
-void fluxion_occluded_packet(void *scene, const FluxionRays *rays, uint32_t blocked[FLUXION_PACKET]);
+void fluxion_occluded_packet(void *scene, int width, const FluxionRays *rays, uint32_t blocked[FLUXION_PACKET]);
 
 #ifdef __cplusplus
 }

@@ -26,13 +26,16 @@
 //! # }
 //! ```
 
+// First, for its macro `vectorized` is used by the others.
+#[macro_use]
+pub mod ffi;
+
 pub mod error;
 pub mod files;
 pub mod math;
 pub mod mattes;
 pub mod pixels;
 
-pub mod ffi;
 pub mod image;
 
 pub mod scene;

@@ -6,6 +6,7 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use fluxion::error::Error;
+use fluxion::ffi::vectors::Vectors;
 
 use self::cli::terminal;
 
@@ -13,7 +14,8 @@ use self::cli::terminal;
 static ALLOCATOR: fluxion::ffi::memory::Allocator = fluxion::ffi::memory::Allocator;
 
 fn main() -> ExitCode {
-    match cli::run(cli::Args::parse()) {
+    let args = cli::Args::parse();
+    match Vectors::allowed().map_err(anyhow::Error::from).and_then(|_| cli::run(args)) {
         Ok(code) => code,
         Err(error) if terminal::is_closed_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {

@@ -5,6 +5,8 @@ pub mod memory;
 pub mod oidn;
 #[cfg(feature = "openimageio")]
 pub mod oiio;
+#[macro_use]
+pub mod vectors;
 
 /// The declarations that bindgen makes from the headers under `ffi/`.
 #[allow(

@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use super::tensor::Tensor;
+use crate::ffi::vectors::Vectors;
 use crate::math::lanes::{LANES, Lanes};
 
 /// Function of a weighted sum.
@@ -255,28 +256,26 @@ impl Sums<'_> {
     }
 }
 
-#[cfg_attr(
-    not(baseline),
-    multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))
-)]
-fn accumulate<const P: usize>(
-    sums: &mut [Lanes; P],
-    window: &[f32],
-    weights: &[f32],
-    starts: &[usize],
-    (offset, pixel, inputs): (usize, usize, usize),
-) {
-    let mut total = *sums;
-    for (start, weights) in starts.iter().zip(weights.chunks_exact(inputs * LANES)) {
-        let values = &window[start + offset..][..(P - 1) * pixel + inputs];
-        for (input, weights) in weights.chunks_exact(LANES).enumerate() {
-            let weights = Lanes::load(weights);
-            for (p, sum) in total.iter_mut().enumerate() {
-                *sum += Lanes::splat(values[p * pixel + input]) * weights;
+vectorized! {
+    fn accumulate<const P: usize>(
+        sums: &mut [Lanes; P],
+        window: &[f32],
+        weights: &[f32],
+        starts: &[usize],
+        (offset, pixel, inputs): (usize, usize, usize),
+    ) {
+        let mut total = *sums;
+        for (start, weights) in starts.iter().zip(weights.chunks_exact(inputs * LANES)) {
+            let values = &window[start + offset..][..(P - 1) * pixel + inputs];
+            for (input, weights) in weights.chunks_exact(LANES).enumerate() {
+                let weights = Lanes::load(weights);
+                for (p, sum) in total.iter_mut().enumerate() {
+                    *sum += Lanes::splat(values[p * pixel + input]) * weights;
+                }
             }
         }
+        *sums = total;
     }
-    *sums = total;
 }
 
 impl Activation {
@@ -297,8 +296,5 @@ fn padded(bias: &[f32]) -> Vec<f32> {
 
 /// Whether there are 32 vector registers instead of 16. Only the speed depends on it.
 fn has_wide_registers() -> bool {
-    #[cfg(all(target_arch = "x86_64", not(baseline)))]
-    return std::arch::is_x86_feature_detected!("avx512f");
-    #[cfg(not(all(target_arch = "x86_64", not(baseline))))]
-    false
+    Vectors::get() == Vectors::Avx512
 }

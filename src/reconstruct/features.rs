@@ -73,40 +73,38 @@ impl Feature {
     }
 }
 
-#[cfg_attr(
-    not(baseline),
-    multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))
-)]
-fn clean_tile(mean: &Planes, noise: &Planes, tile: PlaneTile) -> Vec<f32> {
-    let mut out = vec![0.0; 4 * tile.width * tile.height];
-    for (x, y) in tile.blocks() {
-        let at = ((tile.x + x) as isize, (tile.y + y) as isize);
-        let centre: [Lanes; 3] = std::array::from_fn(|c| mean.lanes(c, at.0, at.1));
-        let here = noise.lanes(0, at.0, at.1);
-        let tolerance = (here * Lanes::splat(100.0)).max(Lanes::splat(1e-4));
-        let (mut total, mut variance, mut sums) = (Lanes::ZERO, Lanes::ZERO, [Lanes::ZERO; 3]);
-        for (dx, dy) in (-RADIUS..=RADIUS).flat_map(|dy| (-RADIUS..=RADIUS).map(move |dx| (dx, dy))) {
-            let q = (at.0 + dx, at.1 + dy);
-            let values: [Lanes; 3] = std::array::from_fn(|c| mean.lanes(c, q.0, q.1));
-            let there = noise.lanes(0, q.0, q.1);
-            let mut beyond = Lanes::ZERO - (here + there);
-            for c in 0..3 {
-                beyond += (values[c] - centre[c]) * (values[c] - centre[c]);
+vectorized! {
+    fn clean_tile(mean: &Planes, noise: &Planes, tile: PlaneTile) -> Vec<f32> {
+        let mut out = vec![0.0; 4 * tile.width * tile.height];
+        for (x, y) in tile.blocks() {
+            let at = ((tile.x + x) as isize, (tile.y + y) as isize);
+            let centre: [Lanes; 3] = std::array::from_fn(|c| mean.lanes(c, at.0, at.1));
+            let here = noise.lanes(0, at.0, at.1);
+            let tolerance = (here * Lanes::splat(100.0)).max(Lanes::splat(1e-4));
+            let (mut total, mut variance, mut sums) = (Lanes::ZERO, Lanes::ZERO, [Lanes::ZERO; 3]);
+            for (dx, dy) in (-RADIUS..=RADIUS).flat_map(|dy| (-RADIUS..=RADIUS).map(move |dx| (dx, dy))) {
+                let q = (at.0 + dx, at.1 + dy);
+                let values: [Lanes; 3] = std::array::from_fn(|c| mean.lanes(c, q.0, q.1));
+                let there = noise.lanes(0, q.0, q.1);
+                let mut beyond = Lanes::ZERO - (here + there);
+                for c in 0..3 {
+                    beyond += (values[c] - centre[c]) * (values[c] - centre[c]);
+                }
+                let far = beyond.max(Lanes::ZERO) / tolerance + Lanes::splat((dx * dx + dy * dy) as f32);
+                let weight = (Lanes::ZERO - far).exp_negative();
+                total += weight;
+                variance += weight * weight * there;
+                for c in 0..3 {
+                    sums[c] += weight * values[c];
+                }
             }
-            let far = beyond.max(Lanes::ZERO) / tolerance + Lanes::splat((dx * dx + dy * dy) as f32);
-            let weight = (Lanes::ZERO - far).exp_negative();
-            total += weight;
-            variance += weight * weight * there;
-            for c in 0..3 {
-                sums[c] += weight * values[c];
+            for (c, sum) in sums.into_iter().enumerate() {
+                tile.put(&mut out, c, x, y, sum / total);
             }
+            tile.put(&mut out, 3, x, y, variance / (total * total));
         }
-        for (c, sum) in sums.into_iter().enumerate() {
-            tile.put(&mut out, c, x, y, sum / total);
-        }
-        tile.put(&mut out, 3, x, y, variance / (total * total));
+        out
     }
-    out
 }
 
 #[cfg(test)]

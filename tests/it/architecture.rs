@@ -18,7 +18,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("plan", &["scene", "film", "neighbours", "reconstruct"]),
     ("neighbours", &["scene", "film", "image", "nn", "math"]),
     ("render", &["scene", "film", "plan", "neighbours", "image", "math"]),
-    ("nn", &["math"]),
+    ("nn", &["math", "ffi"]),
     ("reconstruct", &["film", "image", "nn", "solve", "math"]),
     ("adaptive", &["scene", "render", "film", "reconstruct", "image", "math"]),
     ("checkpoint", &["scene", "render", "film", "neighbours", "adaptive", "image", "math", "files"]),
@@ -50,6 +50,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
 
 /// Files that may use `ffi`; everything else goes through them.
 const FFI_USERS: &[&str] = &[
+    "src/nn/convolution.rs",
     "src/image/io.rs",
     "src/image/oidn.rs",
     "src/scene/accel.rs",

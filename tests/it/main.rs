@@ -26,6 +26,7 @@ mod methods;
 mod nn;
 mod oidn;
 mod outputs;
+mod processors;
 mod report;
 mod samples;
 mod shell;

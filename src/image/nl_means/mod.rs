@@ -63,34 +63,32 @@ pub fn clean(noisy: &Guide, tolerance: f32) -> Planes {
     filter(mean, &Guides { color, features: Vec::new() }, settings)
 }
 
-/// Weights of a tile's pixels for those of their windows, centres included, by colour alone. For each of the tile's
-/// blocks the offsets follow each other, row by row, with a weight for every pixel. Those outside the image have none.
-#[cfg_attr(
-    not(baseline),
-    multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))
-)]
-pub fn weights(guide: &Guide, settings: NlmSettings, tile: PlaneTile) -> Vec<f32> {
-    let offsets = (2 * settings.window + 1).pow(2);
-    let mut weights = vec![0.0; offsets * tile.height * tile.width.next_multiple_of(LANES)];
-    let mut patches = Patches::new(tile, settings.patch, 1);
-    for (k, (dx, dy)) in window(settings.window).enumerate() {
-        patches.compare(guide, Other::At(dx, dy), settings.color * settings.color, &[settings.patch]);
-        for (block, (x, y)) in tile.blocks().enumerate() {
-            let distance = patches.mean(0, settings.patch, x, y).max(Lanes::ZERO);
-            let mut weight = (Lanes::ZERO - distance).exp_negative();
-            let row = (tile.y + y) as isize + dy;
-            let column = (tile.x + x) as isize + dx;
-            let rows = 0..guide.mean.height as isize;
-            for (i, weight) in weight.0.iter_mut().enumerate() {
-                let inside = (0..guide.mean.width as isize).contains(&(column + i as isize));
-                if !(inside && rows.contains(&row) && x + i < tile.width) {
-                    *weight = 0.0;
+vectorized! {
+    /// Weights of a tile's pixels for those of their windows, centres included, by colour alone. For each of the tile's
+    /// blocks the offsets follow each other, row by row, with a weight for every pixel. Those outside the image have none.
+    pub fn weights(guide: &Guide, settings: NlmSettings, tile: PlaneTile) -> Vec<f32> {
+        let offsets = (2 * settings.window + 1).pow(2);
+        let mut weights = vec![0.0; offsets * tile.height * tile.width.next_multiple_of(LANES)];
+        let mut patches = Patches::new(tile, settings.patch, 1);
+        for (k, (dx, dy)) in window(settings.window).enumerate() {
+            patches.compare(guide, Other::At(dx, dy), settings.color * settings.color, &[settings.patch]);
+            for (block, (x, y)) in tile.blocks().enumerate() {
+                let distance = patches.mean(0, settings.patch, x, y).max(Lanes::ZERO);
+                let mut weight = (Lanes::ZERO - distance).exp_negative();
+                let row = (tile.y + y) as isize + dy;
+                let column = (tile.x + x) as isize + dx;
+                let rows = 0..guide.mean.height as isize;
+                for (i, weight) in weight.0.iter_mut().enumerate() {
+                    let inside = (0..guide.mean.width as isize).contains(&(column + i as isize));
+                    if !(inside && rows.contains(&row) && x + i < tile.width) {
+                        *weight = 0.0;
+                    }
                 }
+                weight.store(&mut weights[(block * offsets + k) * LANES..]);
             }
-            weight.store(&mut weights[(block * offsets + k) * LANES..]);
         }
+        weights
     }
-    weights
 }
 
 /// Offsets of a window, row by row.
@@ -104,41 +102,39 @@ fn offsets(radius: usize) -> impl Iterator<Item = (isize, isize)> {
     window(radius).filter(|&offset| offset != (0, 0))
 }
 
-#[cfg_attr(
-    not(baseline),
-    multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))
-)]
-fn filter_tile(values: &Planes, guides: &Guides, settings: NlmSettings, tile: PlaneTile) -> Vec<f32> {
-    let width = tile.width.next_multiple_of(LANES);
-    let channels = values.channels();
-    let mut patches = Patches::new(tile, settings.patch, 1);
-    // Total weight, largest weight, and the sums of each channel.
-    let mut sums = vec![Lanes::ZERO; (2 + channels) * tile.height * width / LANES];
-    for (dx, dy) in offsets(settings.window) {
-        patches.compare(&guides.color, Other::At(dx, dy), settings.color * settings.color, &[settings.patch]);
-        for ((x, y), sums) in tile.blocks().zip(sums.chunks_exact_mut(2 + channels)) {
-            let (px, py) = ((tile.x + x) as isize, (tile.y + y) as isize);
-            let mut distance = patches.mean(0, settings.patch, x, y).max(Lanes::ZERO);
-            if let Some(k) = settings.feature {
-                distance = distance.max(guides.apart((px, py), Other::At(dx, dy), k * k));
+vectorized! {
+    fn filter_tile(values: &Planes, guides: &Guides, settings: NlmSettings, tile: PlaneTile) -> Vec<f32> {
+        let width = tile.width.next_multiple_of(LANES);
+        let channels = values.channels();
+        let mut patches = Patches::new(tile, settings.patch, 1);
+        // Total weight, largest weight, and the sums of each channel.
+        let mut sums = vec![Lanes::ZERO; (2 + channels) * tile.height * width / LANES];
+        for (dx, dy) in offsets(settings.window) {
+            patches.compare(&guides.color, Other::At(dx, dy), settings.color * settings.color, &[settings.patch]);
+            for ((x, y), sums) in tile.blocks().zip(sums.chunks_exact_mut(2 + channels)) {
+                let (px, py) = ((tile.x + x) as isize, (tile.y + y) as isize);
+                let mut distance = patches.mean(0, settings.patch, x, y).max(Lanes::ZERO);
+                if let Some(k) = settings.feature {
+                    distance = distance.max(guides.apart((px, py), Other::At(dx, dy), k * k));
+                }
+                let weight = (Lanes::ZERO - distance).exp_negative();
+                sums[0] += weight;
+                sums[1] = sums[1].max(weight);
+                for c in 0..channels {
+                    sums[2 + c] += weight * values.lanes(c, px + dx, py + dy);
+                }
             }
-            let weight = (Lanes::ZERO - distance).exp_negative();
-            sums[0] += weight;
-            sums[1] = sums[1].max(weight);
+        }
+        let mut out = vec![0.0; channels * tile.width * tile.height];
+        for ((x, y), sums) in tile.blocks().zip(sums.chunks_exact(2 + channels)) {
+            // The centre is like itself, but no more so than the best of the others: its noise is its own.
+            let centre = sums[1].max(Lanes::splat(1e-3));
             for c in 0..channels {
-                sums[2 + c] += weight * values.lanes(c, px + dx, py + dy);
+                let value = values.lanes(c, (tile.x + x) as isize, (tile.y + y) as isize);
+                let mean = (sums[2 + c] + centre * value) / (sums[0] + centre);
+                tile.put(&mut out, c, x, y, mean);
             }
         }
+        out
     }
-    let mut out = vec![0.0; channels * tile.width * tile.height];
-    for ((x, y), sums) in tile.blocks().zip(sums.chunks_exact(2 + channels)) {
-        // The centre is like itself, but no more so than the best of the others: its noise is its own.
-        let centre = sums[1].max(Lanes::splat(1e-3));
-        for c in 0..channels {
-            let value = values.lanes(c, (tile.x + x) as isize, (tile.y + y) as isize);
-            let mean = (sums[2 + c] + centre * value) / (sums[0] + centre);
-            tile.put(&mut out, c, x, y, mean);
-        }
-    }
-    out
 }

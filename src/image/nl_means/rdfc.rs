@@ -153,20 +153,18 @@ fn alike(patches: &Patches, k: usize, x: usize, y: usize) -> Lanes {
     if k < 2 { patches.mean(k, PATCHES[k], x, y) } else { Lanes::ZERO }
 }
 
-/// Nine planes of filtered colours, three of errors, three of slopes.
-#[cfg_attr(
-    not(baseline),
-    multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))
-)]
-fn denoise_tile(guides: &Guides, tile: PlaneTile, options: Options) -> Vec<f32> {
-    let width = tile.width.next_multiple_of(LANES);
-    let mut sums = vec![[EMPTY; 3]; tile.height * width / LANES];
-    if options.symmetric {
-        add_pairs(guides, tile, options.window, &mut sums);
-    } else {
-        add_pixels(guides, tile, options.window, &mut sums);
+vectorized! {
+    /// Nine planes of filtered colours, three of errors, three of slopes.
+    fn denoise_tile(guides: &Guides, tile: PlaneTile, options: Options) -> Vec<f32> {
+        let width = tile.width.next_multiple_of(LANES);
+        let mut sums = vec![[EMPTY; 3]; tile.height * width / LANES];
+        if options.symmetric {
+            add_pairs(guides, tile, options.window, &mut sums);
+        } else {
+            add_pixels(guides, tile, options.window, &mut sums);
+        }
+        finish(guides, tile, &sums)
     }
-    finish(guides, tile, &sums)
 }
 
 #[inline(always)]

@@ -40,65 +40,63 @@ impl Candidates<'_> {
     }
 }
 
-#[cfg_attr(
-    not(baseline),
-    multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))
-)]
-fn block(candidates: &Candidates, pilot: Option<&Blocks>, (x, y): (usize, usize)) -> [Lanes; CHANNELS] {
-    let Regression { features, color, weight } = candidates.problem;
-    let here = features.at(x, y);
-    let (lowest, highest) = candidates.orders;
-    let target = pilot.unwrap_or(color).at(x, y);
-    let weight = weight.at(x, y)[0];
-    let pixels: f32 = weight.0.iter().map(|&weight| f32::from(u8::from(weight > 0.0))).sum();
-    let (mut sums, mut total) = ([Lanes::ZERO; CHANNELS], 0.0);
-    for v in y.saturating_sub(REACH)..(y + REACH + 1).min(color.rows) {
-        for u in x.saturating_sub(REACH)..(x + REACH + 1).min(color.columns) {
-            let (du, dv) = (u as f32 - x as f32, v as f32 - y as f32);
-            let near = (-(du * du + dv * dv) / (SPREAD * SPREAD)).exp();
-            let columns_here = design(here, (x, y), centre((u, v)));
-            for fits in candidates.fits {
-                let Fit { inverse, slopes } = &fits[v * color.columns + u];
-                let (mut fitted, mut leverage) = ([Lanes::ZERO; 3], Lanes::ZERO);
-                let mut m = 0;
-                for order in 0..=highest.min(ORDER) {
-                    while m < columns(here.len(), order) {
-                        let row = &inverse[entry(m, 0)..=entry(m, m)];
-                        let mut q = Lanes::ZERO;
-                        for (&factor, &column) in row.iter().zip(&columns_here) {
-                            q += Lanes::splat(factor) * column;
+vectorized! {
+    fn block(candidates: &Candidates, pilot: Option<&Blocks>, (x, y): (usize, usize)) -> [Lanes; CHANNELS] {
+        let Regression { features, color, weight } = candidates.problem;
+        let here = features.at(x, y);
+        let (lowest, highest) = candidates.orders;
+        let target = pilot.unwrap_or(color).at(x, y);
+        let weight = weight.at(x, y)[0];
+        let pixels: f32 = weight.0.iter().map(|&weight| f32::from(u8::from(weight > 0.0))).sum();
+        let (mut sums, mut total) = ([Lanes::ZERO; CHANNELS], 0.0);
+        for v in y.saturating_sub(REACH)..(y + REACH + 1).min(color.rows) {
+            for u in x.saturating_sub(REACH)..(x + REACH + 1).min(color.columns) {
+                let (du, dv) = (u as f32 - x as f32, v as f32 - y as f32);
+                let near = (-(du * du + dv * dv) / (SPREAD * SPREAD)).exp();
+                let columns_here = design(here, (x, y), centre((u, v)));
+                for fits in candidates.fits {
+                    let Fit { inverse, slopes } = &fits[v * color.columns + u];
+                    let (mut fitted, mut leverage) = ([Lanes::ZERO; 3], Lanes::ZERO);
+                    let mut m = 0;
+                    for order in 0..=highest.min(ORDER) {
+                        while m < columns(here.len(), order) {
+                            let row = &inverse[entry(m, 0)..=entry(m, m)];
+                            let mut q = Lanes::ZERO;
+                            for (&factor, &column) in row.iter().zip(&columns_here) {
+                                q += Lanes::splat(factor) * column;
+                            }
+                            leverage += q * q;
+                            for c in 0..3 {
+                                fitted[c] += q * Lanes::splat(slopes[m][c]);
+                            }
+                            m += 1;
                         }
-                        leverage += q * q;
+                        if order < lowest {
+                            continue;
+                        }
+                        let mut square = Lanes::ZERO;
                         for c in 0..3 {
-                            fitted[c] += q * Lanes::splat(slopes[m][c]);
+                            let off = fitted[c] - target[c];
+                            square += off * off;
                         }
-                        m += 1;
+                        // In units of the variance, which is the inverse of the weight: the variance of a fit is its leverage.
+                        let leverage = weight * leverage;
+                        let (off, variance) = ((weight * square).sum() / pixels, leverage.sum() / pixels);
+                        let error = match pilot {
+                            Some(_) => off + variance,
+                            None => (off - 1.0 + 2.0 * variance).max(variance),
+                        };
+                        let share = near / (error + LEAST);
+                        total += share;
+                        let share = Lanes::splat(share);
+                        for c in 0..3 {
+                            sums[c] += share * fitted[c];
+                        }
+                        sums[LEVERAGE] += share * leverage;
                     }
-                    if order < lowest {
-                        continue;
-                    }
-                    let mut square = Lanes::ZERO;
-                    for c in 0..3 {
-                        let off = fitted[c] - target[c];
-                        square += off * off;
-                    }
-                    // In units of the variance, which is the inverse of the weight: the variance of a fit is its leverage.
-                    let leverage = weight * leverage;
-                    let (off, variance) = ((weight * square).sum() / pixels, leverage.sum() / pixels);
-                    let error = match pilot {
-                        Some(_) => off + variance,
-                        None => (off - 1.0 + 2.0 * variance).max(variance),
-                    };
-                    let share = near / (error + LEAST);
-                    total += share;
-                    let share = Lanes::splat(share);
-                    for c in 0..3 {
-                        sums[c] += share * fitted[c];
-                    }
-                    sums[LEVERAGE] += share * leverage;
                 }
             }
         }
+        sums.map(|sum| sum / Lanes::splat(total))
     }
-    sums.map(|sum| sum / Lanes::splat(total))
 }

@@ -93,24 +93,22 @@ impl Regression<'_> {
     }
 }
 
-#[cfg_attr(
-    not(baseline),
-    multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))
-)]
-fn products(columns: &[Lanes], color: &[Lanes], weight: Lanes, sums: &mut [f64]) {
-    let mut weighted = [Lanes::ZERO; COLUMNS];
-    for (slot, &column) in weighted.iter_mut().zip(columns) {
-        *slot = weight * column;
-    }
-    let mut slots = sums.iter_mut();
-    for i in 0..columns.len() {
-        for (column, slot) in columns[..=i].iter().zip(&mut slots) {
-            *slot = f64::from((weighted[i] * *column).sum());
+vectorized! {
+    fn products(columns: &[Lanes], color: &[Lanes], weight: Lanes, sums: &mut [f64]) {
+        let mut weighted = [Lanes::ZERO; COLUMNS];
+        for (slot, &column) in weighted.iter_mut().zip(columns) {
+            *slot = weight * column;
         }
-    }
-    for weighted in &weighted[..columns.len()] {
-        for (color, slot) in color.iter().zip(&mut slots) {
-            *slot = f64::from((*weighted * *color).sum());
+        let mut slots = sums.iter_mut();
+        for i in 0..columns.len() {
+            for (column, slot) in columns[..=i].iter().zip(&mut slots) {
+                *slot = f64::from((weighted[i] * *column).sum());
+            }
+        }
+        for weighted in &weighted[..columns.len()] {
+            for (color, slot) in color.iter().zip(&mut slots) {
+                *slot = f64::from((*weighted * *color).sum());
+            }
         }
     }
 }

@@ -113,26 +113,24 @@ fn exact_tile(problem: &FilterProblem, tile: PlaneTile) -> Vec<f32> {
     out
 }
 
-#[cfg_attr(
-    not(baseline),
-    multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))
-)]
-fn sweep_tile(problem: &FilterProblem, tile: PlaneTile) -> Vec<f32> {
-    let mut out = vec![0.0; 6 * tile.width * tile.height];
-    let mut weights = vec![Lanes::ZERO; (2 * problem.radius + 1).pow(2)];
-    for (x, y) in tile.blocks() {
-        let at = ((tile.x + x) as isize, (tile.y + y) as isize);
-        // The number of terms is known to the compiler, so that their sums stay in registers.
-        let planes = match problem.terms.len() {
-            1 => Sweeps::<1>::new(problem, at, &mut weights).run(),
-            2 => Sweeps::<2>::new(problem, at, &mut weights).run(),
-            3 => Sweeps::<3>::new(problem, at, &mut weights).run(),
-            4 => Sweeps::<4>::new(problem, at, &mut weights).run(),
-            _ => Sweeps::<TERMS>::new(problem, at, &mut weights).run(),
-        };
-        planes.into_iter().enumerate().for_each(|(c, values)| tile.put(&mut out, c, x, y, values));
+vectorized! {
+    fn sweep_tile(problem: &FilterProblem, tile: PlaneTile) -> Vec<f32> {
+        let mut out = vec![0.0; 6 * tile.width * tile.height];
+        let mut weights = vec![Lanes::ZERO; (2 * problem.radius + 1).pow(2)];
+        for (x, y) in tile.blocks() {
+            let at = ((tile.x + x) as isize, (tile.y + y) as isize);
+            // The number of terms is known to the compiler, so that their sums stay in registers.
+            let planes = match problem.terms.len() {
+                1 => Sweeps::<1>::new(problem, at, &mut weights).run(),
+                2 => Sweeps::<2>::new(problem, at, &mut weights).run(),
+                3 => Sweeps::<3>::new(problem, at, &mut weights).run(),
+                4 => Sweeps::<4>::new(problem, at, &mut weights).run(),
+                _ => Sweeps::<TERMS>::new(problem, at, &mut weights).run(),
+            };
+            planes.into_iter().enumerate().for_each(|(c, values)| tile.put(&mut out, c, x, y, values));
+        }
+        out
     }
-    out
 }
 
 /// The sweeps of [`LANES`] pixels. A step from weights w towards pixel q changes Σ w u and Σ v w² only along u_q and

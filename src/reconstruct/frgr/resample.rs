@@ -157,47 +157,45 @@ impl Resampling {
 /// Most channels of a guide.
 const CHANNELS: usize = 9;
 
-#[cfg_attr(
-    not(baseline),
-    multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))
-)]
-fn fit_row(guide: &Planes, coarse: &Planes, y: usize) -> Fit {
-    let channels = guide.channels().min(CHANNELS);
-    let mut fit = Fit { pairs: vec![Pair::default(); guide.width], left: vec![0.0; guide.width] };
-    for (x0, odd) in (0..coarse.width).step_by(LANES).flat_map(|x| [(x, 0), (x, 1)]) {
-        let mut target = [Lanes::ZERO; CHANNELS];
-        let mut near = [[Lanes::ZERO; CHANNELS]; 9];
-        let mut away = [Lanes::ZERO; 9];
-        for c in 0..channels {
-            let row = guide.tail_from(c, (2 * x0 + odd) as isize, y as isize);
-            target[c] = Lanes(std::array::from_fn(|l| row[2 * l]));
-            for k in 0..9 {
-                let (x, y) = around(k, x0, y / 2);
-                near[k][c] = coarse.lanes(c, x, y);
-                away[k] += (target[c] - near[k][c]) * (target[c] - near[k][c]);
-            }
-        }
-        let (mut best, mut weight, mut code) = (Lanes::splat(f32::INFINITY), Lanes::ZERO, Lanes::ZERO);
-        for (a, b) in (0..9).flat_map(|a| (0..a).map(move |b| (a, b))) {
-            let (mut dot, mut length) = (Lanes::ZERO, Lanes::ZERO);
+vectorized! {
+    fn fit_row(guide: &Planes, coarse: &Planes, y: usize) -> Fit {
+        let channels = guide.channels().min(CHANNELS);
+        let mut fit = Fit { pairs: vec![Pair::default(); guide.width], left: vec![0.0; guide.width] };
+        for (x0, odd) in (0..coarse.width).step_by(LANES).flat_map(|x| [(x, 0), (x, 1)]) {
+            let mut target = [Lanes::ZERO; CHANNELS];
+            let mut near = [[Lanes::ZERO; CHANNELS]; 9];
+            let mut away = [Lanes::ZERO; 9];
             for c in 0..channels {
-                let d = near[a][c] - near[b][c];
-                dot += (target[c] - near[b][c]) * d;
-                length += d * d;
+                let row = guide.tail_from(c, (2 * x0 + odd) as isize, y as isize);
+                target[c] = Lanes(std::array::from_fn(|l| row[2 * l]));
+                for k in 0..9 {
+                    let (x, y) = around(k, x0, y / 2);
+                    near[k][c] = coarse.lanes(c, x, y);
+                    away[k] += (target[c] - near[k][c]) * (target[c] - near[k][c]);
+                }
             }
-            let share = (dot / (length + Lanes::splat(1e-5))).max(Lanes::ZERO).min(Lanes::splat(1.0));
-            let left = away[b] + share * (share * length - dot - dot);
-            weight = share.where_greater(best, left, weight);
-            code = Lanes::splat((9 * a + b) as f32).where_greater(best, left, code);
-            best = best.min(left);
+            let (mut best, mut weight, mut code) = (Lanes::splat(f32::INFINITY), Lanes::ZERO, Lanes::ZERO);
+            for (a, b) in (0..9).flat_map(|a| (0..a).map(move |b| (a, b))) {
+                let (mut dot, mut length) = (Lanes::ZERO, Lanes::ZERO);
+                for c in 0..channels {
+                    let d = near[a][c] - near[b][c];
+                    dot += (target[c] - near[b][c]) * d;
+                    length += d * d;
+                }
+                let share = (dot / (length + Lanes::splat(1e-5))).max(Lanes::ZERO).min(Lanes::splat(1.0));
+                let left = away[b] + share * (share * length - dot - dot);
+                weight = share.where_greater(best, left, weight);
+                code = Lanes::splat((9 * a + b) as f32).where_greater(best, left, code);
+                best = best.min(left);
+            }
+            for l in 0..LANES.min(coarse.width - x0) {
+                let (x, code) = (2 * (x0 + l) + odd, code.0[l] as u8);
+                fit.pairs[x] = Pair { first: code / 9, second: code % 9, weight: weight.0[l] };
+                fit.left[x] = best.0[l].max(0.0).sqrt();
+            }
         }
-        for l in 0..LANES.min(coarse.width - x0) {
-            let (x, code) = (2 * (x0 + l) + odd, code.0[l] as u8);
-            fit.pairs[x] = Pair { first: code / 9, second: code % 9, weight: weight.0[l] };
-            fit.left[x] = best.0[l].max(0.0).sqrt();
-        }
+        fit
     }
-    fit
 }
 
 /// Numbers the groups of touching pixels over the tolerance from 1 on; 0 for the others.

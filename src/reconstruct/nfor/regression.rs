@@ -81,65 +81,63 @@ fn columns(features: &Planes, centre: &[Lanes; FEATURES], q: (isize, isize), ste
     columns
 }
 
-/// Weighted sums of the fitted colours and of the weights, over a tile and the windows' margin around it.
-#[cfg_attr(
-    not(baseline),
-    multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))
-)]
-fn fit_tile(color: &Planes, features: &Planes, weights: &[f32], tile: PlaneTile) -> Vec<f32> {
-    let r = WINDOW as isize;
-    let (stride, rows) = reach(tile);
-    let mut out = vec![0.0; 4 * stride * rows];
-    for ((x, y), weights) in tile.blocks().zip(weights.chunks_exact(OFFSETS * LANES)) {
-        let at = ((tile.x + x) as isize, (tile.y + y) as isize);
-        let centre: [Lanes; FEATURES] = std::array::from_fn(|k| features.lanes(k, at.0, at.1));
-        let here: [Lanes; 3] = std::array::from_fn(|c| color.lanes(c, at.0, at.1));
-        let weight = |k: usize| Lanes::load(&weights[k * LANES..]);
-        let mut matrix = [Lanes::ZERO; ENTRIES];
-        let mut right = [[Lanes::ZERO; COLUMNS]; 3];
-        let mut k = 0;
-        for dy in -r..=r {
-            for dx in -r..=r {
-                let q = (at.0 + dx, at.1 + dy);
-                let columns = columns(features, &centre, q, (dx, dy));
-                let weight = weight(k);
-                k += 1;
-                let values: [Lanes; 3] = std::array::from_fn(|c| color.lanes(c, q.0, q.1) - here[c]);
-                let mut entry = 0;
-                for i in 0..COLUMNS {
-                    let weighted = weight * columns[i];
-                    for &column in &columns[..=i] {
-                        matrix[entry] += weighted * column;
-                        entry += 1;
-                    }
-                    for c in 0..3 {
-                        right[c][i] += weighted * values[c];
-                    }
-                }
-            }
-        }
-        solve(&mut matrix, &mut right);
-        let mut k = 0;
-        for dy in -r..=r {
-            for dx in -r..=r {
-                let columns = columns(features, &centre, (at.0 + dx, at.1 + dy), (dx, dy));
-                let weight = weight(k);
-                k += 1;
-                let to = (y as isize + dy + r) as usize * stride + (x as isize + dx + r) as usize;
-                for c in 0..3 {
-                    let mut fit = here[c];
+vectorized! {
+    /// Weighted sums of the fitted colours and of the weights, over a tile and the windows' margin around it.
+    fn fit_tile(color: &Planes, features: &Planes, weights: &[f32], tile: PlaneTile) -> Vec<f32> {
+        let r = WINDOW as isize;
+        let (stride, rows) = reach(tile);
+        let mut out = vec![0.0; 4 * stride * rows];
+        for ((x, y), weights) in tile.blocks().zip(weights.chunks_exact(OFFSETS * LANES)) {
+            let at = ((tile.x + x) as isize, (tile.y + y) as isize);
+            let centre: [Lanes; FEATURES] = std::array::from_fn(|k| features.lanes(k, at.0, at.1));
+            let here: [Lanes; 3] = std::array::from_fn(|c| color.lanes(c, at.0, at.1));
+            let weight = |k: usize| Lanes::load(&weights[k * LANES..]);
+            let mut matrix = [Lanes::ZERO; ENTRIES];
+            let mut right = [[Lanes::ZERO; COLUMNS]; 3];
+            let mut k = 0;
+            for dy in -r..=r {
+                for dx in -r..=r {
+                    let q = (at.0 + dx, at.1 + dy);
+                    let columns = columns(features, &centre, q, (dx, dy));
+                    let weight = weight(k);
+                    k += 1;
+                    let values: [Lanes; 3] = std::array::from_fn(|c| color.lanes(c, q.0, q.1) - here[c]);
+                    let mut entry = 0;
                     for i in 0..COLUMNS {
-                        fit += right[c][i] * columns[i];
+                        let weighted = weight * columns[i];
+                        for &column in &columns[..=i] {
+                            matrix[entry] += weighted * column;
+                            entry += 1;
+                        }
+                        for c in 0..3 {
+                            right[c][i] += weighted * values[c];
+                        }
                     }
-                    let slot = &mut out[c * stride * rows + to..];
-                    (Lanes::load(slot) + weight * fit).store(slot);
                 }
-                let slot = &mut out[3 * stride * rows + to..];
-                (Lanes::load(slot) + weight).store(slot);
+            }
+            solve(&mut matrix, &mut right);
+            let mut k = 0;
+            for dy in -r..=r {
+                for dx in -r..=r {
+                    let columns = columns(features, &centre, (at.0 + dx, at.1 + dy), (dx, dy));
+                    let weight = weight(k);
+                    k += 1;
+                    let to = (y as isize + dy + r) as usize * stride + (x as isize + dx + r) as usize;
+                    for c in 0..3 {
+                        let mut fit = here[c];
+                        for i in 0..COLUMNS {
+                            fit += right[c][i] * columns[i];
+                        }
+                        let slot = &mut out[c * stride * rows + to..];
+                        (Lanes::load(slot) + weight * fit).store(slot);
+                    }
+                    let slot = &mut out[3 * stride * rows + to..];
+                    (Lanes::load(slot) + weight).store(slot);
+                }
             }
         }
+        out
     }
-    out
 }
 
 /// Solves symmetric systems in place, by Cholesky decomposition: slopes take the place of right-hand sides.

@@ -150,13 +150,11 @@ impl AllLobes<LANES> for Closures {
     }
 }
 
-/// Normals of the visible facets of packets, in the widest vectors that there are.
-#[cfg_attr(
-    not(baseline),
-    multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))
-)]
-pub fn visible_facets(facets: &Facets, wi: Lanes3, u: [Lanes; 2]) -> Lanes3 {
-    facets.sample_visible(wi, u)
+vectorized! {
+    /// Normals of the visible facets of packets, in the widest vectors that there are.
+    pub fn visible_facets(facets: &Facets, wi: Lanes3, u: [Lanes; 2]) -> Lanes3 {
+        facets.sample_visible(wi, u)
+    }
 }
 
 /// [`Lobes::delta`] of a single closure.

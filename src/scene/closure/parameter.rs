@@ -133,20 +133,16 @@ macro_rules! parameters {
                 }
             }
 
-            #[cfg_attr(
-                not(baseline),
-                multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))
-            )]
-            fn eval(closures: &Closures, [wi, wo]: [Lanes3; 2]) -> Evals {
-                $kind::load(closures).eval(wi, wo)
+            vectorized! {
+                fn eval(closures: &Closures, [wi, wo]: [Lanes3; 2]) -> Evals {
+                    $kind::load(closures).eval(wi, wo)
+                }
             }
 
-            #[cfg_attr(
-                not(baseline),
-                multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))
-            )]
-            fn propose(closures: &Closures, wi: Lanes3, numbers: &Numbers) -> Proposals {
-                $kind::load(closures).propose(wi, numbers)
+            vectorized! {
+                fn propose(closures: &Closures, wi: Lanes3, numbers: &Numbers) -> Proposals {
+                    $kind::load(closures).propose(wi, numbers)
+                }
             }
         };
     };

@@ -295,24 +295,20 @@ impl Scene {
     }
 }
 
-/// [`EnvMap::hits`] in the widest vectors that there are.
-#[cfg_attr(
-    not(baseline),
-    multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))
-)]
-fn envmap_hits(map: &EnvMap, rays: &Rays, active: Mask) -> EnvmapHits {
-    map.hits(rays.direction, active)
+vectorized! {
+    /// [`EnvMap::hits`] in the widest vectors that there are.
+    fn envmap_hits(map: &EnvMap, rays: &Rays, active: Mask) -> EnvmapHits {
+        map.hits(rays.direction, active)
+    }
 }
 
-#[cfg_attr(
-    not(baseline),
-    multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))
-)]
-fn shadow_rays(scene_size: f32, from: &Surfaces, lights: &Lights) -> Rays {
-    let towards = lights.far.select3(lights.at, lights.at - from.p);
-    let origin = from.leave(towards);
-    let near = surfaces::offset(lights.at, lights.n, surfaces::epsilon(lights.at, scene_size), from.p - lights.at);
-    let end = lights.surface.select3(near, lights.at);
-    let t_far = lights.far.select(Lanes::splat(f32::INFINITY), Lanes::splat(accel::SHADOW_END));
-    Rays { origin, direction: lights.far.select3(lights.at, end - origin), t_far }
+vectorized! {
+    fn shadow_rays(scene_size: f32, from: &Surfaces, lights: &Lights) -> Rays {
+        let towards = lights.far.select3(lights.at, lights.at - from.p);
+        let origin = from.leave(towards);
+        let near = surfaces::offset(lights.at, lights.n, surfaces::epsilon(lights.at, scene_size), from.p - lights.at);
+        let end = lights.surface.select3(near, lights.at);
+        let t_far = lights.far.select(Lanes::splat(f32::INFINITY), Lanes::splat(accel::SHADOW_END));
+        Rays { origin, direction: lights.far.select3(lights.at, end - origin), t_far }
+    }
 }

@@ -101,20 +101,16 @@ impl Materials {
     }
 }
 
-/// [`Closures::eval`] in the widest vectors that there are.
-#[cfg_attr(
-    not(baseline),
-    multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))
-)]
-fn eval(closures: &Closures, (wi, wo): (Lanes3, Lanes3), active: Mask) -> Evals {
-    closures.eval(wi, wo, active)
+vectorized! {
+    /// [`Closures::eval`] in the widest vectors that there are.
+    fn eval(closures: &Closures, (wi, wo): (Lanes3, Lanes3), active: Mask) -> Evals {
+        closures.eval(wi, wo, active)
+    }
 }
 
-/// [`Closures::sample`] in the widest vectors that there are.
-#[cfg_attr(
-    not(baseline),
-    multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))
-)]
-fn sample(closures: &Closures, wi: Lanes3, numbers: (Lanes, [Lanes; 2]), active: Mask) -> Draws {
-    closures.sample(wi, numbers, active)
+vectorized! {
+    /// [`Closures::sample`] in the widest vectors that there are.
+    fn sample(closures: &Closures, wi: Lanes3, numbers: (Lanes, [Lanes; 2]), active: Mask) -> Draws {
+        closures.sample(wi, numbers, active)
+    }
 }

@@ -253,68 +253,64 @@ impl Scene {
     }
 }
 
-#[cfg_attr(
-    not(baseline),
-    multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))
-)]
-fn between(a: &Surfaces, b: &Surfaces) -> Rays {
-    let origin = a.leave(b.p - a.p);
-    let end = b.leave(a.p - b.p);
-    Rays { origin, direction: end - origin, t_far: Lanes::splat(accel::SHADOW_END) }
+vectorized! {
+    fn between(a: &Surfaces, b: &Surfaces) -> Rays {
+        let origin = a.leave(b.p - a.p);
+        let end = b.leave(a.p - b.p);
+        Rays { origin, direction: end - origin, t_far: Lanes::splat(accel::SHADOW_END) }
+    }
 }
 
-/// Completes the hits on meshes in lanes; returns the lanes of all other hits.
-#[cfg_attr(
-    not(baseline),
-    multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))
-)]
-fn meshes(
-    (shapes, shape_infos): (&[Shape], &[ShapeInfo]),
-    scene_size: f32,
-    rays: &Rays,
-    hits: &Hits,
-    found: Mask,
-    surfaces: &mut Surfaces,
-) -> Mask {
-    let mut left = Mask::NONE;
-    surfaces.emissive = Mask::NONE;
-    let mut corners = [[[0.0f32; LANES]; 3]; 6];
-    let mut side = [1.0f32; LANES];
-    let (u, v) = (Lanes(hits.u), Lanes(hits.v));
-    surfaces.uv = [u, v];
-    for lane in found.lanes() {
-        let number = hits.geometry[lane] as usize;
-        if hits.instance[lane] != u32::MAX || !shape_infos[number].mesh {
-            left.set(lane, true);
-            continue;
+vectorized! {
+    /// Completes the hits on meshes in lanes; returns the lanes of all other hits.
+    fn meshes(
+        (shapes, shape_infos): (&[Shape], &[ShapeInfo]),
+        scene_size: f32,
+        rays: &Rays,
+        hits: &Hits,
+        found: Mask,
+        surfaces: &mut Surfaces,
+    ) -> Mask {
+        let mut left = Mask::NONE;
+        surfaces.emissive = Mask::NONE;
+        let mut corners = [[[0.0f32; LANES]; 3]; 6];
+        let mut side = [1.0f32; LANES];
+        let (u, v) = (Lanes(hits.u), Lanes(hits.v));
+        surfaces.uv = [u, v];
+        for lane in found.lanes() {
+            let number = hits.geometry[lane] as usize;
+            if hits.instance[lane] != u32::MAX || !shape_infos[number].mesh {
+                left.set(lane, true);
+                continue;
+            }
+            surfaces.emissive.set(lane, shape_infos[number].emitter.is_some());
+            let Geometry::Mesh(mesh) = &*shapes[number].geometry else { continue };
+            let one = mesh.corners(hits.primitive[lane]);
+            for (to, from) in corners.iter_mut().zip(one.p.iter().chain(&one.n)) {
+                (to[0][lane], to[1][lane], to[2][lane]) = (*from).into();
+            }
+            side[lane] = mesh.side();
+            if shape_infos[number].uv {
+                let (u, v) = (hits.u[lane], hits.v[lane]);
+                (surfaces.uv[0].0[lane], surfaces.uv[1].0[lane]) =
+                    mesh.uv_at(hits.primitive[lane], [1.0 - u - v, u, v]).into();
+            }
         }
-        surfaces.emissive.set(lane, shape_infos[number].emitter.is_some());
-        let Geometry::Mesh(mesh) = &*shapes[number].geometry else { continue };
-        let one = mesh.corners(hits.primitive[lane]);
-        for (to, from) in corners.iter_mut().zip(one.p.iter().chain(&one.n)) {
-            (to[0][lane], to[1][lane], to[2][lane]) = (*from).into();
-        }
-        side[lane] = mesh.side();
-        if shape_infos[number].uv {
-            let (u, v) = (hits.u[lane], hits.v[lane]);
-            (surfaces.uv[0].0[lane], surfaces.uv[1].0[lane]) =
-                mesh.uv_at(hits.primitive[lane], [1.0 - u - v, u, v]).into();
-        }
+        let [a, b, c, na, nb, nc] = corners.map(|[x, y, z]| Lanes3 { x: Lanes(x), y: Lanes(y), z: Lanes(z) });
+        let weight = Lanes::splat(1.0) - u - v;
+        let side = Lanes(side);
+        let up = Lanes3::splat(Vec3::Z);
+        let flat = (b - a).cross(c - a).normalize_or(up) * side;
+        let smooth = (na * weight + nb * u + nc * v).normalize_or(flat * side) * side;
+        let frame = Frames::around(smooth);
+        surfaces.p = a * weight + b * u + c * v;
+        surfaces.n = flat * Lanes::splat(1.0).copysign(flat.dot(smooth));
+        surfaces.frame = frame;
+        surfaces.wi = frame.to_local(-rays.direction);
+        surfaces.epsilon = epsilon(surfaces.p, scene_size);
+        surfaces.shape = Bits(hits.geometry);
+        surfaces.barycentric = [u, v];
+        surfaces.primitive = Bits(hits.primitive);
+        left
     }
-    let [a, b, c, na, nb, nc] = corners.map(|[x, y, z]| Lanes3 { x: Lanes(x), y: Lanes(y), z: Lanes(z) });
-    let weight = Lanes::splat(1.0) - u - v;
-    let side = Lanes(side);
-    let up = Lanes3::splat(Vec3::Z);
-    let flat = (b - a).cross(c - a).normalize_or(up) * side;
-    let smooth = (na * weight + nb * u + nc * v).normalize_or(flat * side) * side;
-    let frame = Frames::around(smooth);
-    surfaces.p = a * weight + b * u + c * v;
-    surfaces.n = flat * Lanes::splat(1.0).copysign(flat.dot(smooth));
-    surfaces.frame = frame;
-    surfaces.wi = frame.to_local(-rays.direction);
-    surfaces.epsilon = epsilon(surfaces.p, scene_size);
-    surfaces.shape = Bits(hits.geometry);
-    surfaces.barycentric = [u, v];
-    surfaces.primitive = Bits(hits.primitive);
-    left
 }

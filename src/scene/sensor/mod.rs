@@ -242,37 +242,35 @@ impl Sensor {
     }
 }
 
-#[cfg_attr(
-    not(baseline),
-    multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))
-)]
-fn view(sensor: &Sensor, [x, y]: [Lanes; 2], [lens_u, lens_v]: [Lanes; 2]) -> Rays {
-    // Window to film and film to the plane at distance one are one scale and one shift together.
-    let (start, end) = (sensor.film.position(Vec2::ZERO), sensor.film.position(Vec2::ONE));
-    let scale = -2.0 * (end - start) * sensor.half_extent / vec2(sensor.width as f32, sensor.height as f32);
-    let shift = (Vec2::ONE - 2.0 * (start + sensor.principal_point)) * sensor.half_extent;
-    let along = |at: Lanes, scale: f32, shift: f32| at * Lanes::splat(scale) + Lanes::splat(shift);
-    let (x, y) = (along(x, scale.x, shift.x), along(y, scale.y, shift.y));
-    let one = Lanes::splat(1.0);
-    let (origin, direction) = match sensor.projection {
-        Projection::Pinhole => (Lanes3::ZERO, Lanes3 { x, y, z: one }),
-        Projection::Lens { radius, focus } => {
-            let [u, v] = warp::disk_lanes([lens_u, lens_v]);
-            let origin = Lanes3 { x: u, y: v, z: Lanes::ZERO } * Lanes::splat(radius);
-            (origin, Lanes3 { x, y, z: one } * Lanes::splat(focus) - origin)
-        }
-        Projection::Parallel => (Lanes3 { x, y, z: Lanes::ZERO }, Lanes3::splat(Vec3::Z)),
-    };
-    let axis = |column: Vec4| Lanes3::splat(column.truncate());
-    let [right, up, forward, position] =
-        [sensor.to_world.x_axis, sensor.to_world.y_axis, sensor.to_world.z_axis, sensor.to_world.w_axis].map(axis);
-    let to_world = |v: Lanes3| right * v.x + up * v.y + forward * v.z;
-    let local = direction.normalize_or(Lanes3::splat(Vec3::Z));
-    let along = to_world(local);
-    // Planes are at depths along z; a scaled camera has its planes scaled.
-    let length = along.dot(along).sqrt();
-    let direction = along * (one / length);
-    let distance = |depth: f32| Lanes::splat(depth) / local.z * length;
-    let origin = to_world(origin) + position + direction * distance(sensor.near);
-    Rays { origin, direction, t_far: distance(sensor.far - sensor.near) }
+vectorized! {
+    fn view(sensor: &Sensor, [x, y]: [Lanes; 2], [lens_u, lens_v]: [Lanes; 2]) -> Rays {
+        // Window to film and film to the plane at distance one are one scale and one shift together.
+        let (start, end) = (sensor.film.position(Vec2::ZERO), sensor.film.position(Vec2::ONE));
+        let scale = -2.0 * (end - start) * sensor.half_extent / vec2(sensor.width as f32, sensor.height as f32);
+        let shift = (Vec2::ONE - 2.0 * (start + sensor.principal_point)) * sensor.half_extent;
+        let along = |at: Lanes, scale: f32, shift: f32| at * Lanes::splat(scale) + Lanes::splat(shift);
+        let (x, y) = (along(x, scale.x, shift.x), along(y, scale.y, shift.y));
+        let one = Lanes::splat(1.0);
+        let (origin, direction) = match sensor.projection {
+            Projection::Pinhole => (Lanes3::ZERO, Lanes3 { x, y, z: one }),
+            Projection::Lens { radius, focus } => {
+                let [u, v] = warp::disk_lanes([lens_u, lens_v]);
+                let origin = Lanes3 { x: u, y: v, z: Lanes::ZERO } * Lanes::splat(radius);
+                (origin, Lanes3 { x, y, z: one } * Lanes::splat(focus) - origin)
+            }
+            Projection::Parallel => (Lanes3 { x, y, z: Lanes::ZERO }, Lanes3::splat(Vec3::Z)),
+        };
+        let axis = |column: Vec4| Lanes3::splat(column.truncate());
+        let [right, up, forward, position] =
+            [sensor.to_world.x_axis, sensor.to_world.y_axis, sensor.to_world.z_axis, sensor.to_world.w_axis].map(axis);
+        let to_world = |v: Lanes3| right * v.x + up * v.y + forward * v.z;
+        let local = direction.normalize_or(Lanes3::splat(Vec3::Z));
+        let along = to_world(local);
+        // Planes are at depths along z; a scaled camera has its planes scaled.
+        let length = along.dot(along).sqrt();
+        let direction = along * (one / length);
+        let distance = |depth: f32| Lanes::splat(depth) / local.z * length;
+        let origin = to_world(origin) + position + direction * distance(sensor.near);
+        Rays { origin, direction, t_far: distance(sensor.far - sensor.near) }
+    }
 }

@@ -166,31 +166,29 @@ struct Step<'a> {
     slot: usize,
 }
 
-/// Returns the differences of the light sampled at the vertices and of the emitters hit next, and sets the states of the
-/// offsets at the next vertices.
-#[cfg_attr(
-    not(baseline),
-    multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))
-)]
-fn shift_segment(
-    step: &Step,
-    scratch: &mut Scratch,
-    (for_light, for_scatter): (&States, &States),
-    (next_states, offsets): (&mut LevelStates, &mut OffsetSurfaces),
-) -> SegmentDifferences {
-    let Step { context, vertices, next, active, slot } = *step;
-    scratch.load_offsets(context, offsets, (for_light, for_scatter), active);
-    let lit = active & vertices.lit & for_light.inside();
-    scratch.connected += (lit & for_light.are(Kind::Unconnected)).count();
-    let sampled =
-        if lit.any() { sampled_emitters(context, vertices, scratch.offset(), for_light, lit) } else { Lanes3::ZERO };
-    let ambient = if context.ambient { active } else { Mask::NONE };
-    let leaving = active & for_scatter.inside() & vertices.scattered & (next.exists | vertices.hits_emitter | ambient);
-    if !leaving.any() {
-        return SegmentDifferences { color: sampled, ambient: Lanes3::ZERO };
+vectorized! {
+    /// Returns the differences of the light sampled at the vertices and of the emitters hit next, and sets the states of the
+    /// offsets at the next vertices.
+    fn shift_segment(
+        step: &Step,
+        scratch: &mut Scratch,
+        (for_light, for_scatter): (&States, &States),
+        (next_states, offsets): (&mut LevelStates, &mut OffsetSurfaces),
+    ) -> SegmentDifferences {
+        let Step { context, vertices, next, active, slot } = *step;
+        scratch.load_offsets(context, offsets, (for_light, for_scatter), active);
+        let lit = active & vertices.lit & for_light.inside();
+        scratch.connected += (lit & for_light.are(Kind::Unconnected)).count();
+        let sampled =
+            if lit.any() { sampled_emitters(context, vertices, scratch.offset(), for_light, lit) } else { Lanes3::ZERO };
+        let ambient = if context.ambient { active } else { Mask::NONE };
+        let leaving = active & for_scatter.inside() & vertices.scattered & (next.exists | vertices.hits_emitter | ambient);
+        if !leaving.any() {
+            return SegmentDifferences { color: sampled, ambient: Lanes3::ZERO };
+        }
+        let segment = OffsetSegment::new(context, vertices, scratch, for_scatter, leaving);
+        let hit = segment.emission_differences(context);
+        segment.continue_offsets(context, next, (next_states, slot), offsets);
+        SegmentDifferences { color: sampled + hit.color, ambient: hit.ambient }
     }
-    let segment = OffsetSegment::new(context, vertices, scratch, for_scatter, leaving);
-    let hit = segment.emission_differences(context);
-    segment.continue_offsets(context, next, (next_states, slot), offsets);
-    SegmentDifferences { color: sampled + hit.color, ambient: hit.ambient }
 }

@@ -84,9 +84,11 @@ unsafe extern "C" fn remember(user: *mut c_void, code: c_int, message: *const c_
 pub struct Device(Arc<DeviceHandle>);
 
 impl Device {
-    /// A device that builds with `threads` threads (0: all).
+    /// A device that builds with `threads` threads (0: all). The environment variable `FLUXION_EMBREE` may hold more of its
+    /// configuration, as `isa=avx2`.
     pub fn new(threads: usize) -> Result<Self> {
-        Self::with_config(&format!("threads={threads}"))
+        let more = std::env::var("FLUXION_EMBREE").unwrap_or_default();
+        Self::with_config(&format!("threads={threads},{more}"))
     }
 
     /// A device with a configuration string in Embree's own syntax.
@@ -114,9 +116,11 @@ impl Device {
 
     /// An empty scene to fill.
     pub fn scene(&self) -> SceneBuilder {
+        let device = Arc::clone(&self.0);
         // SAFETY: the device is alive, and the builder keeps it so.
-        let raw = unsafe { raw::fluxion_scene_new(self.0.raw) };
-        SceneBuilder(SceneHandle { raw, buffers: Vec::new(), device: Arc::clone(&self.0) })
+        let (raw, packet_width) =
+            unsafe { (raw::fluxion_scene_new(device.raw), raw::fluxion_packet_width(device.raw)) };
+        SceneBuilder(SceneHandle { raw, packet_width, buffers: Vec::new(), device })
     }
 }
 
@@ -152,6 +156,7 @@ impl Hits {
 
 struct SceneHandle {
     raw: *mut c_void,
+    packet_width: c_int,
     buffers: Vec<Buffer>,
     device: Arc<DeviceHandle>,
 }
@@ -295,7 +300,7 @@ impl Committed {
         let mut hits = std::mem::MaybeUninit::uninit();
         // SAFETY: the scene is committed; both pointers are valid for the call, which writes every field.
         unsafe {
-            raw::fluxion_intersect_packet(self.0.raw, rays, coherent, hits.as_mut_ptr());
+            raw::fluxion_intersect_packet(self.0.raw, self.0.packet_width, rays, coherent, hits.as_mut_ptr());
             hits.assume_init()
         }
     }
@@ -305,91 +310,10 @@ impl Committed {
     pub fn occluded_packet(&self, rays: &Rays) -> [u32; 16] {
         let mut blocked = [0; 16];
         // SAFETY: as above; there is room for every word.
-        unsafe { raw::fluxion_occluded_packet(self.0.raw, rays, blocked.as_mut_ptr()) }
+        unsafe { raw::fluxion_occluded_packet(self.0.raw, self.0.packet_width, rays, blocked.as_mut_ptr()) }
         blocked
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn unit_triangle() -> (Arc<PaddedVertices>, Arc<Vec<[u32; 3]>>) {
-        let vertices = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-        (Arc::new(PaddedVertices::new(vertices.into_iter())), Arc::new(vec![[0, 1, 2]]))
-    }
-
-    fn ray(x: f32, y: f32) -> Ray {
-        Ray { origin: [x, y, 1.0], t_near: 0.0, direction: [0.0, 0.0, -1.0], t_far: f32::INFINITY }
-    }
-
-    #[test]
-    fn a_triangle_and_a_sphere_are_hit_where_they_are() {
-        let device = Device::new(1).unwrap();
-        let (vertices, indices) = unit_triangle();
-        let mut builder = device.scene();
-        let triangle = builder.add_triangles(&vertices, &indices).unwrap();
-        let sphere = builder.add_spheres(vec![[5.0, 0.0, 0.0, 0.5]]).unwrap();
-        let scene = builder.commit().unwrap();
-        drop((device, vertices, indices));
-
-        let hit = scene.intersect(&ray(0.25, 0.5)).unwrap();
-        assert_eq!((hit.geometry, hit.primitive), (triangle, 0));
-        assert!((hit.t - 1.0).abs() < 1e-6 && (hit.u - 0.25).abs() < 1e-6 && (hit.v - 0.5).abs() < 1e-6);
-        let hit = scene.intersect(&ray(5.0, 0.0)).unwrap();
-        assert_eq!(hit.geometry, sphere);
-        assert!((hit.t - 0.5).abs() < 1e-5);
-        assert!(scene.intersect(&ray(2.0, 2.0)).is_none());
-        assert!(scene.occluded(&ray(0.25, 0.5)) && !scene.occluded(&ray(2.0, 2.0)));
-    }
-
-    #[test]
-    fn packets_meet_what_single_rays_meet_and_inactive_rays_nothing() {
-        let device = Device::new(1).unwrap();
-        let (vertices, indices) = unit_triangle();
-        let mut builder = device.scene();
-        builder.add_triangles(&vertices, &indices).unwrap();
-        builder.add_spheres(vec![[1.5, 0.5, 0.0, 0.25]]).unwrap();
-        let scene = builder.commit().unwrap();
-        let x: [f32; 16] = std::array::from_fn(|i| 0.05 + 0.12 * i as f32);
-        let (zero, one) = ([0.0; 16], [1.0; 16]);
-        let active = std::array::from_fn(|i| if i % 5 == 4 { 0 } else { !0 });
-        let rays = Rays {
-            origin: [x, [0.4; 16], one],
-            direction: [zero, zero, one.map(|_| -1.0)],
-            t_far: [f32::INFINITY; 16],
-            active,
-        };
-        for coherent in [false, true] {
-            let (hits, blocked) = (scene.intersect_packet(&rays, coherent), scene.occluded_packet(&rays));
-            for i in 0..16 {
-                let single = scene.intersect(&ray(x[i], 0.4)).filter(|_| active[i] != 0);
-                let found = hits.get(i);
-                assert_eq!((single.is_some(), single.is_some()), (found.is_some(), blocked[i] != 0), "ray {i}");
-                let Some((a, b)) = single.zip(found) else { continue };
-                assert_eq!((a.geometry, a.primitive, a.instance()), (b.geometry, b.primitive, b.instance()));
-                assert!((a.t - b.t).abs() < 1e-5 && (a.u - b.u).abs() < 1e-5 && (a.v - b.v).abs() < 1e-5);
-            }
-        }
-    }
-
-    #[test]
-    fn an_index_out_of_range_and_a_bad_configuration_are_errors() {
-        let device = Device::new(1).unwrap();
-        let (vertices, _) = unit_triangle();
-        let error = device.scene().add_triangles(&vertices, &Arc::new(vec![[0, 1, 3]])).unwrap_err();
-        assert!(error.to_string().contains("vertex"));
-        assert!(Device::with_config("isa=no_such_isa\0").is_err());
-    }
-
-    #[test]
-    fn an_error_callback_surfaces_as_an_error() {
-        let device = Device::new(1).unwrap();
-        // SAFETY: the callback gets the live reported error and a static string, as from Embree.
-        unsafe {
-            remember(std::ptr::from_ref::<Reported>(&device.0.reported).cast_mut().cast(), 2, c"no room".as_ptr())
-        };
-        assert_eq!(device.0.check().unwrap_err().to_string(), "embree: no room (error code 2)");
-        assert!(device.0.check().is_ok());
-    }
-}
+mod tests;
