@@ -16,6 +16,7 @@ namespace {
 struct OpenImage {
   std::unique_ptr<OIIO::ImageInput> input;
   std::string attribute;
+  int part = 0;
 };
 
 void fail(FluxionError *error, const std::string &message, const char *otherwise) {
@@ -33,7 +34,7 @@ OIIO::TypeDesc type_of(const char *kind) {
 bool read_samples(void *handle, OIIO::TypeDesc type, void *pixels, FluxionError *error) try {
   auto *image = static_cast<OpenImage *>(handle);
   const int channels = image->input->spec().nchannels;
-  if (image->input->read_image(0, 0, 0, channels, type, pixels)) return true;
+  if (image->input->read_image(image->part, 0, 0, channels, type, pixels)) return true;
   fail(error, image->input->geterror(), "the pixels could not be read: the file may be truncated");
   return false;
 } catch (const std::exception &exception) {
@@ -46,7 +47,7 @@ bool read_samples(void *handle, OIIO::TypeDesc type, void *pixels, FluxionError 
 
 }  // namespace
 
-extern "C" void *fluxion_image_open(const char *path, FluxionImageSpec *spec, FluxionError *error) try {
+extern "C" void *fluxion_image_open(const char *path, FluxionError *error) try {
   auto image = std::make_unique<OpenImage>();
   // Colours as they are stored: by default they would be multiplied by alpha.
   OIIO::ImageSpec config;
@@ -56,30 +57,6 @@ extern "C" void *fluxion_image_open(const char *path, FluxionImageSpec *spec, Fl
     fail(error, OIIO::geterror(), "the file is missing or of an unknown format");
     return nullptr;
   }
-  const OIIO::ImageSpec &found = image->input->spec();
-  if (found.depth > 1 || found.deep) {
-    fail(error, "", "volumes and deep images are not supported");
-    return nullptr;
-  }
-  // A reader makes room for a tile as large as the header claims.
-  const double tile = static_cast<double>(found.tile_width) * found.tile_height * found.nchannels;
-  const double image_samples = static_cast<double>(found.width) * found.height * found.nchannels;
-  if (tile > 16777216.0 && tile > image_samples) {
-    fail(error, "", "the header claims tiles that are larger than the image");
-    return nullptr;
-  }
-  spec->width = found.width;
-  spec->height = found.height;
-  spec->channels = found.nchannels;
-  spec->x = found.x;
-  spec->y = found.y;
-  const bool whole = found.x == found.full_x && found.y == found.full_y && found.width == found.full_width &&
-                     found.height == found.full_height;
-  if (!whole) {
-    spec->full_width = found.full_width;
-    spec->full_height = found.full_height;
-  }
-  std::strncpy(spec->format, image->input->format_name(), sizeof spec->format - 1);
   return image.release();
 } catch (const std::exception &exception) {
   fail(error, exception.what(), "opening the image failed");
@@ -87,6 +64,59 @@ extern "C" void *fluxion_image_open(const char *path, FluxionImageSpec *spec, Fl
 } catch (...) {
   fail(error, "", "opening the image failed");
   return nullptr;
+}
+
+extern "C" int fluxion_image_parts(void *handle) try {
+  auto *image = static_cast<OpenImage *>(handle);
+  // Pages and icons of other formats are pictures of their own.
+  if (std::strcmp(image->input->format_name(), "openexr") != 0) return 1;
+  const int parts = image->input->spec().get_int_attribute("oiio:subimages", 1);
+  return parts < 1 ? 1 : parts > FLUXION_MAX_PARTS ? FLUXION_MAX_PARTS : parts;
+} catch (...) {
+  return 1;
+}
+
+extern "C" bool fluxion_image_part(void *handle, int part, FluxionImageSpec *spec, FluxionError *error) try {
+  auto *image = static_cast<OpenImage *>(handle);
+  if (!image->input->seek_subimage(part, 0)) {
+    fail(error, image->input->geterror(), "a part of the file cannot be read");
+    return false;
+  }
+  image->part = part;
+  const OIIO::ImageSpec &found = image->input->spec();
+  if (found.depth > 1) {
+    fail(error, "", "volumes are not supported");
+    return false;
+  }
+  // A reader makes room for a tile as large as the header claims.
+  const double tile = static_cast<double>(found.tile_width) * found.tile_height * found.nchannels;
+  const double image_samples = static_cast<double>(found.width) * found.height * found.nchannels;
+  if (tile > 16777216.0 && tile > image_samples) {
+    fail(error, "", "the header claims tiles that are larger than the image");
+    return false;
+  }
+  spec->width = found.width;
+  spec->height = found.height;
+  spec->channels = found.nchannels;
+  spec->x = found.x;
+  spec->y = found.y;
+  spec->deep = found.deep;
+  const bool whole = found.x == found.full_x && found.y == found.full_y && found.width == found.full_width &&
+                     found.height == found.full_height;
+  if (!whole) {
+    spec->full_width = found.full_width;
+    spec->full_height = found.full_height;
+  }
+  std::strncpy(spec->format, image->input->format_name(), sizeof spec->format - 1);
+  const std::string name = found.get_string_attribute("oiio:subimagename");
+  std::strncpy(spec->part, name.c_str(), sizeof spec->part - 1);
+  return true;
+} catch (const std::exception &exception) {
+  fail(error, exception.what(), "a part of the file cannot be read");
+  return false;
+} catch (...) {
+  fail(error, "", "a part of the file cannot be read");
+  return false;
 }
 
 extern "C" const char *fluxion_image_channel(void *handle, int index) {

@@ -27,6 +27,10 @@ typedef struct FluxionImageSpec {
   int full_height;
   /* OpenImageIO's name of the file format. */
   char format[16];
+  /* Name of the part; may be empty. */
+  char part[256];
+  /* Whether pixels are lists of samples at different depths, which cannot be read. */
+  bool deep;
 } FluxionImageSpec;
 
 /* How the samples of a channel are stored. */
@@ -43,7 +47,14 @@ typedef struct FluxionAttribute {
   const char *value;
 } FluxionAttribute;
 
-void *fluxion_image_open(const char *path, FluxionImageSpec *spec, FluxionError *error);
+/* More parts than this are taken for a damaged file. */
+#define FLUXION_MAX_PARTS 1024
+
+void *fluxion_image_open(const char *path, FluxionError *error);
+/* Number of the parts of an open image: one, but for some exr files. */
+int fluxion_image_parts(void *image);
+/* Goes to a part, which what follows is about, and describes it. */
+bool fluxion_image_part(void *image, int part, FluxionImageSpec *spec, FluxionError *error);
 /* The strings belong to the open image. Null when there is no such channel or attribute. */
 const char *fluxion_image_channel(void *image, int index);
 const char *fluxion_image_attribute(void *image, const char *name);

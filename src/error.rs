@@ -45,7 +45,8 @@ impl fmt::Display for SourceLoc {
     }
 }
 
-/// The reason why something could not be done. The program exits with 2 after [`Error::Usage`] and with 1 after all others.
+/// The reason why something could not be done. The program exits with 2 after [`Error::Usage`] and
+/// [`Error::TooLittleMemory`] and with 1 after all others.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// The input is well formed but asks for something that Fluxion does not have.
@@ -81,6 +82,19 @@ pub enum Error {
     /// A parameter or option has a value that makes no sense.
     #[error("{0}")]
     Usage(String),
+    /// A method may use less memory than it needs.
+    #[error(
+        "reconstructing {}x{} pixels with {method} takes {} MB besides the layers; allow it with --max-memory {}",
+        size.0, size.1, megabytes(*bytes), megabytes(*bytes)
+    )]
+    TooLittleMemory {
+        /// The method.
+        method: &'static str,
+        /// Width and height of the image.
+        size: (usize, usize),
+        /// Bytes that it needs.
+        bytes: u64,
+    },
     /// The system could not read or write a file, or the file is not what it should be.
     #[error("{}: {what}", path.display())]
     Io {
@@ -97,6 +111,11 @@ pub enum Error {
         /// The library's reason.
         what: String,
     },
+}
+
+/// Bytes in whole megabytes, which hold them.
+fn megabytes(bytes: u64) -> u64 {
+    bytes.div_ceil(1 << 20)
 }
 
 impl Error {

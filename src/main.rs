@@ -21,7 +21,7 @@ fn main() -> ExitCode {
         Err(error) => {
             terminal::note!("error: {error:#}");
             match error.downcast_ref() {
-                Some(Error::Usage(_)) => ExitCode::from(2),
+                Some(Error::Usage(_) | Error::TooLittleMemory { .. }) => ExitCode::from(2),
                 _ => ExitCode::FAILURE,
             }
         }

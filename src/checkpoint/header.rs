@@ -178,6 +178,9 @@ pub fn is_one(path: &Path) -> bool {
     File::open(path).and_then(|mut file| file.read_exact(&mut magic)).is_ok() && magic == MAGIC
 }
 
+/// The fault of a file that was claimed, as renders do when they begin, and never written.
+const EMPTY: &str = "is empty: whoever was to write it ended before it did";
+
 /// A checkpoint that is being read: its tiles come one by one.
 pub struct Reader {
     path: PathBuf,
@@ -196,6 +199,9 @@ impl Reader {
         let failed = |error| Error::io(path, explain(error));
         let file = File::open(path).map_err(failed)?;
         let length = file.metadata().map_err(failed)?.len();
+        if length == 0 {
+            return Err(Error::io(path, EMPTY));
+        }
         let mut from = Summed::new(BufReader::with_capacity(buffer, file));
         let (header, version) = header(&mut from, length).map_err(failed)?;
         let size = header.origin.size;

@@ -11,7 +11,7 @@ use fluxion::metrics::{self, METRICS};
 use fluxion::report::{Page, Shown, View, heat};
 
 use super::outputs::{Claims, write_json};
-use super::terminal::out;
+use super::terminal::{note, out};
 
 /// Options of `compare`.
 #[derive(clap::Args)]
@@ -44,7 +44,15 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     })?;
     let Some((reference, paths)) = args.images.split_last() else { bail!("there is no image") };
     let images = paths.iter().map(|path| io::read_picture(path)).collect::<Result<Vec<_>, _>>()?;
+    let path_of_reference = reference;
     let reference = io::read_picture(reference)?;
+    check_finite(path_of_reference, &reference)?;
+    for (path, image) in paths.iter().zip(&images) {
+        check_finite(path, image)?;
+        if image.window != reference.window && image.color.shape() == reference.color.shape() {
+            note!("warning: {} and {} are different windows of a picture", path.display(), path_of_reference.display());
+        }
+    }
     let maps: Vec<_> = args.map.iter().cloned().collect();
     let inputs: Vec<_> = args.images.iter().map(PathBuf::as_path).collect();
     let _claims = Claims::new(&maps, &[&args.json, &args.html], &inputs)?;
@@ -79,6 +87,12 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         files::write(path, &page(paths, images, reference)?)?;
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Fails with the name of the file whose colour is not finite.
+fn check_finite(path: &Path, picture: &Picture) -> Result<()> {
+    let Some((x, y, c)) = picture.color.not_finite() else { return Ok(()) };
+    bail!(Error::BadData(format!("{}: {} is not finite at pixel {x},{y}", path.display(), ["R", "G", "B"][c])))
 }
 
 fn print(object: &serde_json::Map<String, serde_json::Value>, path: &Path) -> Result<()> {

@@ -145,7 +145,8 @@ fn describe(scene: &Scene, method: &str) -> Result<()> {
     out!("emitters     {} ({})", scene.emitters().len(), names.join(", "))?;
     let bounds = scene.bounds();
     if !bounds.is_empty() {
-        out!("bounds       {} to {}", bounds.lower, bounds.upper)?;
+        let origin = scene.origin().as_vec3();
+        out!("bounds       {} to {}", bounds.lower + origin, bounds.upper + origin)?;
     }
     out!("hierarchy    Embree {major}.{minor}.{patch}")?;
     out!("fingerprint  {}", fingerprint(scene))?;

@@ -52,6 +52,9 @@ impl Args {
         quiet: bool,
         stats: &mut Stats,
     ) -> Result<Solution> {
+        for warning in method.warnings(frame) {
+            note!("warning: {warning}");
+        }
         let start = Instant::now();
         let bar = progress::bar(quiet);
         let report = |what: &str, share| {

@@ -14,7 +14,22 @@ use super::terminal::out;
 pub struct Claims(Vec<PathBuf>);
 
 impl Claims {
-    /// Claims images and other files, all of them different from each other and from the inputs.
+    /// Claims images and other files, all of them different from each other and from the inputs. Files of layers are exr files.
+    pub fn of_layers(
+        images: &[PathBuf],
+        layers: &[&Option<PathBuf>],
+        others: &[&Option<PathBuf>],
+        inputs: &[&Path],
+    ) -> Result<Self> {
+        for path in layers.iter().filter_map(|path| path.as_ref()) {
+            if !io::has_layers(path) {
+                bail!(Error::Usage(format!("{}: layers are written to exr files only", path.display())));
+            }
+        }
+        Self::new(images, &[layers, others].concat(), inputs)
+    }
+
+    /// The same without files of layers.
     pub fn new(images: &[PathBuf], others: &[&Option<PathBuf>], inputs: &[&Path]) -> Result<Self> {
         let others: Vec<_> = others.iter().filter_map(|path| path.as_ref()).collect();
         let mut taken: Vec<_> = inputs.iter().map(|path| identity(path)).collect();

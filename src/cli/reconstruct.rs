@@ -4,13 +4,16 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
 
-use anyhow::Result;
+use anyhow::{Result, anyhow};
 use fluxion::checkpoint;
-use fluxion::film::{Layer, exr};
+use fluxion::error::Error;
+use fluxion::film::{Frame, Layer, exr};
+use fluxion::reconstruct;
 
 use super::method;
 use super::outputs::Claims;
 use super::stats::Stats;
+use super::terminal::note;
 
 /// Options of `reconstruct`.
 #[derive(clap::Args)]
@@ -23,6 +26,9 @@ pub struct Args {
     /// Samples per pixel of a file that does not say
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
     spp: Option<u32>,
+    /// View layer to take, of a file of several
+    #[arg(long, value_name = "NAME")]
+    view_layer: Option<String>,
     #[command(flatten)]
     method: method::Args,
     /// Threads to work with (0: one per core)
@@ -36,6 +42,12 @@ pub struct Args {
     quiet: bool,
 }
 
+/// The error that a layer is missing, with the methods that find all that they need.
+fn with_others(error: anyhow::Error, frame: &Frame) -> anyhow::Error {
+    let Some(Error::Missing { .. }) = error.downcast_ref() else { return error };
+    anyhow!("{error}. Methods that work on this file: {}", reconstruct::possible(frame).join(", "))
+}
+
 /// Reads layers, reconstructs and writes.
 pub fn run(args: &Args) -> Result<ExitCode> {
     super::use_threads(args.threads)?;
@@ -45,7 +57,12 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let mut frame = if checkpoint::is_one(&args.layers) {
         checkpoint::load(&args.layers)?.develop()
     } else {
-        exr::load_counted(&args.layers, args.spp)?
+        let reading = exr::Reading { spp: args.spp, view_layer: args.view_layer.as_deref() };
+        let (frame, warning) = exr::load_other(&args.layers, reading)?;
+        if let Some(warning) = warning {
+            note!("warning: {warning}");
+        }
+        frame
     };
     let _claims = Claims::new(&args.output, &[&args.json], &[&args.layers])?;
     stats.seconds.load = start.elapsed().as_secs_f64();
@@ -54,7 +71,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     stats.kernel.clone_from(&frame.provenance.kernel);
     let sum = |layer| frame.get(layer).map_or(0.0, |image| image.data.iter().map(|&n| f64::from(n)).sum());
     (stats.samples, stats.rejected) = (sum(Layer::Samples) as u64, sum(Layer::Rejected) as u64);
-    let solution = args.method.solve(method.as_ref(), &frame, args.quiet, &mut stats)?;
+    let solution = args.method.solve(method.as_ref(), &frame, args.quiet, &mut stats);
+    let solution = solution.map_err(|error| with_others(error, &frame))?;
     frame.provenance.method.clone_from(&args.method.method);
     method::write((&args.method, method.as_ref()), &args.output, &solution, &frame, &mut stats)?;
     if let Some(path) = &args.json {

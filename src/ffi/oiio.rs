@@ -8,6 +8,7 @@ use std::sync::{Arc, Mutex};
 
 use super::raw::oiio as raw;
 use crate::error::{Error, Result};
+use crate::pixels::parts::{self, Merged, Part};
 use crate::pixels::{DataWindow, Header, Kind, OpenImage, Pixels, Storage, exr_header};
 
 /// OpenImageIO's name of a kind of samples.
@@ -24,6 +25,8 @@ pub struct ImageFile<'a> {
     header: Header,
     path: &'a Path,
     handle: *mut c_void,
+    /// Numbers of the parts that are read, with their numbers of channels.
+    parts: Vec<(i32, usize)>,
 }
 
 impl Deref for ImageFile<'_> {
@@ -58,36 +61,80 @@ unsafe fn owned(text: *const c_char) -> Option<String> {
 }
 
 impl<'a> ImageFile<'a> {
-    /// Reads the header.
+    /// Reads the headers of all parts.
     pub fn open(path: &'a Path) -> Result<Self> {
         let bytes = std::fs::metadata(path).map_err(|error| Error::io(path, error))?.len() as usize;
         exr_header::check(path)?;
         let name = path_string(path)?;
-        let mut spec = raw::FluxionImageSpec::default();
         let mut error = raw::FluxionError::default();
         // SAFETY: all pointers are valid for the call.
-        let handle = unsafe { raw::fluxion_image_open(name.as_ptr(), &mut spec, &mut error) };
+        let handle = unsafe { raw::fluxion_image_open(name.as_ptr(), &mut error) };
         if handle.is_null() {
             return Err(Error::io(path, message(&error)));
         }
+        let mut file = Self { header: Header::default(), path, handle, parts: Vec::new() };
+        // SAFETY: the handle is open.
+        let count = unsafe { raw::fluxion_image_parts(handle) };
+        let parts = (0..count).map(|index| file.part(index)).collect::<Result<Vec<_>>>()?;
+        let merged = parts::merge(&parts);
+        let Merged { header, parts: positions } =
+            merged.ok_or_else(|| Error::io(path, "deep images are not supported"))?;
+        file.parts = positions.into_iter().map(|i| (i as i32, parts[i].header.channels.len())).collect();
+        file.header = header;
+        file.check(path, bytes)?;
+        Ok(file)
+    }
+
+    /// Goes to a part.
+    fn seek(&self, index: i32) -> Result<raw::FluxionImageSpec> {
+        let mut spec = raw::FluxionImageSpec::default();
+        let mut error = raw::FluxionError::default();
+        // SAFETY: the handle is open, and all pointers are valid for the call.
+        let found = unsafe { raw::fluxion_image_part(self.handle, index, &mut spec, &mut error) };
+        if found { Ok(spec) } else { Err(Error::io(self.path, message(&error))) }
+    }
+
+    fn part(&self, index: i32) -> Result<Part> {
+        let spec = self.seek(index)?;
         let [width, height] = [spec.width, spec.height].map(|n| usize::try_from(n).unwrap_or(0));
         let unsigned = |n: i32| usize::try_from(n).ok();
-        let window = [spec.x, spec.y, spec.full_width, spec.full_height].map(unsigned);
-        let window = match window {
+        let window = match [spec.x, spec.y, spec.full_width, spec.full_height].map(unsigned) {
             [Some(x), Some(y), Some(w), Some(h)] if w > 0 => Some(DataWindow { origin: (x, y), full: (w, h) }),
             _ => None,
         };
-        // SAFETY: the array ends in a zero, since the other side copies at most all but one of its bytes.
-        let format = unsafe { owned(spec.format.as_ptr()) }.unwrap_or_default();
-        let header = Header { width, height, origin: (spec.x, spec.y), window, format, ..Header::default() };
-        let mut file = Self { header, path, handle };
-        file.header.channels = (0..spec.channels)
+        // SAFETY: the arrays end in a zero, since the other side copies at most all but one of their bytes.
+        let [format, name] =
+            [spec.format.as_ptr(), spec.part.as_ptr()].map(|text| unsafe { owned(text) }.unwrap_or_default());
+        let channels = (0..spec.channels)
             // SAFETY: the handle is open; the string lives as long.
-            .map(|index| unsafe { owned(raw::fluxion_image_channel(handle, index)) }.unwrap_or_default())
+            .map(|channel| unsafe { owned(raw::fluxion_image_channel(self.handle, channel)) }.unwrap_or_default())
             .collect();
-        file.header.storage = (0..spec.channels).map(|index| file.storage_of(index)).collect();
-        file.check(path, bytes)?;
-        Ok(file)
+        let storage = (0..spec.channels).map(|channel| self.storage_of(channel)).collect();
+        let header =
+            Header { width, height, origin: (spec.x, spec.y), window, format, channels, storage, ..Header::default() };
+        Ok(Part { name, header, deep: spec.deep })
+    }
+
+    /// The samples of all parts; `read` fills those of the one that it is about.
+    fn samples_of_parts<T: Copy + Default>(
+        &self,
+        read: impl Fn(*mut c_void, &mut [T], &mut raw::FluxionError) -> bool,
+    ) -> Result<Vec<T>> {
+        let of_part = |index: i32, count: usize| {
+            self.seek(index)?;
+            let mut data = vec![T::default(); self.width * self.height * count];
+            let mut error = raw::FluxionError::default();
+            if read(self.handle, &mut data, &mut error) { Ok(data) } else { Err(Error::io(self.path, message(&error))) }
+        };
+        if let [(index, count)] = *self.parts {
+            return of_part(index, count);
+        }
+        let (mut all, mut first) = (vec![T::default(); self.samples()], 0);
+        for &(index, count) in &self.parts {
+            parts::interleave(&mut all, (self.channels.len(), first), &of_part(index, count)?, count);
+            first += count;
+        }
+        Ok(all)
     }
 
     fn storage_of(&self, index: i32) -> Storage {
@@ -106,24 +153,25 @@ impl<'a> ImageFile<'a> {
 impl OpenImage for ImageFile<'_> {
     fn attribute(&self, name: &str) -> Option<String> {
         let name = CString::new(name).ok()?;
-        // SAFETY: the handle is open; the string is copied before the next call.
-        unsafe { owned(raw::fluxion_image_attribute(self.handle, name.as_ptr())) }
+        self.parts.iter().find_map(|&(index, _)| {
+            self.seek(index).ok()?;
+            // SAFETY: the handle is open; the string is copied before the next call.
+            unsafe { owned(raw::fluxion_image_attribute(self.handle, name.as_ptr())) }
+        })
     }
 
     fn floats(&self) -> Result<Vec<f32>> {
-        let mut data = vec![0.0; self.samples()];
-        let mut error = raw::FluxionError::default();
-        // SAFETY: `data` has room for width * height * channels floats.
-        let read = unsafe { raw::fluxion_image_read_floats(self.handle, data.as_mut_ptr(), &mut error) };
-        if read { Ok(data) } else { Err(Error::io(self.path, message(&error))) }
+        // SAFETY: there is room for width * height * channels floats.
+        self.samples_of_parts(|handle, data, error| unsafe {
+            raw::fluxion_image_read_floats(handle, data.as_mut_ptr(), error)
+        })
     }
 
     fn bytes(&self) -> Result<Vec<u8>> {
-        let mut data = vec![0; self.samples()];
-        let mut error = raw::FluxionError::default();
-        // SAFETY: `data` has room for width * height * channels bytes.
-        let read = unsafe { raw::fluxion_image_read_bytes(self.handle, data.as_mut_ptr(), &mut error) };
-        if read { Ok(data) } else { Err(Error::io(self.path, message(&error))) }
+        // SAFETY: there is room for width * height * channels bytes.
+        self.samples_of_parts(|handle, data, error| unsafe {
+            raw::fluxion_image_read_bytes(handle, data.as_mut_ptr(), error)
+        })
     }
 }
 

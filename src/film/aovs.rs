@@ -1,5 +1,5 @@
 //! Frames of other programs: their auxiliary channels (AOVs) as layers. Known are the names that Mitsuba 3 (integrators `aov`
-//! and `moment`), Blender's Cycles and pbrt-v4 give them.
+//! and `moment`), Blender's Cycles, pbrt-v4, LuxCore, Arnold and RenderMan give them.
 
 use super::{BINS, Frame, Layer};
 use crate::image::Image;
@@ -8,13 +8,29 @@ use crate::math::rng;
 
 /// Layers with the names that programs give them, the best first: the last part of a channel's name before its component.
 const NAMES: &[(Layer, &[&str])] = &[
-    (Layer::Color, &["noisy image", "combined", "beauty", "rgba"]),
-    (Layer::Albedo, &["denoising albedo", "albedo"]),
-    (Layer::Normal, &["denoising normal", "sh_normal", "ns", "nn", "normal", "normals"]),
+    (Layer::Color, &BEAUTY),
+    (Layer::Albedo, &["denoising albedo", "denoise_albedo", "albedo", "diffuse_albedo"]),
+    (
+        Layer::Normal,
+        &[
+            "denoising normal",
+            "avg_shading_normal",
+            "sh_normal",
+            "ns",
+            "nn",
+            "normal",
+            "normals",
+            "shading_normal",
+            "n",
+        ],
+    ),
     (Layer::Depth, &["denoising depth", "depth", "dd", "z"]),
     (Layer::Position, &["position", "pp", "pos", "p"]),
-    (Layer::Samples, &["debug sample count", "sample count"]),
+    (Layer::Samples, &["debug sample count", "sample count", "samplecount"]),
 ];
+
+/// Names of the picture itself, the best first.
+pub const BEAUTY: [&str; 6] = ["noisy image", "combined", "beauty", "rgba", "rgb_imagepipeline", "ci"];
 
 /// Components of a channel group, in order.
 const COMPONENTS: [&[&str]; 3] = [&["r", "g", "b"], &["x", "y", "z"], &["t"]];
@@ -29,6 +45,9 @@ const VARIANCES: [(Layer, Layer); 4] = [
 
 /// Prefix of Mitsuba's second moments.
 const SECOND_MOMENT: &str = "m2_";
+
+/// Suffix of RenderMan's variances of samples.
+const VARIANCE: &str = "_var";
 
 /// Adds the layers that a frame lacks, as far as the file's other channels say what they are. `spp` are the samples of every
 /// pixel where the file does not say.
@@ -141,9 +160,20 @@ impl<'a> File<'a> {
         Image { data, ..Image::new(self.pixels.width, self.pixels.height, group.positions.len()) }
     }
 
-    /// Variance of the mean of a group whose second moments the file has.
+    /// Variance of the mean from that of the samples.
+    fn over_counts(&self, of_samples: &Group, counts: &[f32]) -> Image {
+        let mut variance = self.image(of_samples);
+        let channels = variance.channels;
+        variance.data.iter_mut().enumerate().for_each(|(i, value)| *value /= counts[i / channels].max(1.0));
+        variance
+    }
+
+    /// Variance of the mean of a group whose second moments, or variances of samples, the file has.
     fn variance(&self, group: &Group, counts: &[f32]) -> Option<Image> {
         let components: Vec<_> = group.positions.iter().map(|&at| component(&self.names[at])).collect();
+        if let Some(of_samples) = self.group(&format!("{}{VARIANCE}", group.prefix), &components) {
+            return Some(self.over_counts(&of_samples, counts));
+        }
         let squares = self.group(&format!("{SECOND_MOMENT}{}", group.prefix), &components)?;
         let (mean, mut variance) = (self.image(group), self.image(&squares));
         let channels = mean.channels;
@@ -153,12 +183,14 @@ impl<'a> File<'a> {
         Some(variance)
     }
 
-    /// Variance of the colour: from pbrt's variance of its samples, or from the second moments of Mitsuba's colours.
+    /// Variance of the colour: RenderMan's mean squared error, the variance of samples that pbrt and Arnold write, or from the
+    /// second moments of Mitsuba's colours.
     fn color_variance(&self, counts: &[f32]) -> Option<Image> {
+        if let Some(of_mean) = self.group("mse", COMPONENTS[0]) {
+            return Some(self.image(&of_mean));
+        }
         if let Some(of_samples) = self.group("variance", COMPONENTS[0]) {
-            let mut variance = self.image(&of_samples);
-            variance.data.iter_mut().enumerate().for_each(|(i, value)| *value /= counts[i / 3].max(1.0));
-            return Some(variance);
+            return Some(self.over_counts(&of_samples, counts));
         }
         let features: Vec<&str> = NAMES[1..].iter().flat_map(|(_, names)| names.iter().copied()).collect();
         let prefixes = self.prefixes();
@@ -242,62 +274,85 @@ mod tests {
         frame
     }
 
-    fn three(names: [&str; 3], values: [f32; 3]) -> [(&str, f32); 3] {
-        [(names[0], values[0]), (names[1], values[1]), (names[2], values[2])]
-    }
+    /// Channels of files of one pixel, with the samples where they do not say, and whether they have depths and variances.
+    const FILES: &[(&str, &str, Option<u32>, bool, bool)] = &[
+        (
+            "mitsuba",
+            "R=1 G=2 B=3 _arg_0.i.R=1 _arg_0.i.G=2 _arg_0.i.B=3 m2__arg_0.i.R=4 m2__arg_0.i.G=4 m2__arg_0.i.B=25
+            _arg_0.albedo.R=0.5 _arg_0.albedo.G=0.25 _arg_0.albedo.B=0.125
+            m2__arg_0.albedo.R=0.25 m2__arg_0.albedo.G=0.25 m2__arg_0.albedo.B=0.125
+            _arg_0.nn.X=0 _arg_0.nn.Y=0.6 _arg_0.nn.Z=0.8 _arg_0.dd.y.T=7 m2__arg_0.dd.y.T=50",
+            Some(5),
+            true,
+            true,
+        ),
+        (
+            "cycles",
+            "View/Layer.Combined.R=9 View/Layer.Combined.G=9 View/Layer.Combined.B=9
+            View/Layer.Noisy/Image.R=1 View/Layer.Noisy/Image.G=2 View/Layer.Noisy/Image.B=3
+            View/Layer.Denoising/Albedo.R=0.5 View/Layer.Denoising/Albedo.G=0.25 View/Layer.Denoising/Albedo.B=0.125
+            View/Layer.Denoising/Normal.X=0 View/Layer.Denoising/Normal.Y=0.6 View/Layer.Denoising/Normal.Z=0.8
+            View/Layer.Denoising/Depth.Z=7 View/Layer.Debug/Sample/Count.X=5",
+            None,
+            true,
+            false,
+        ),
+        (
+            "pbrt",
+            "R=1 G=2 B=3 Albedo.R=0.5 Albedo.G=0.25 Albedo.B=0.125 Ns.X=0 Ns.Y=0.6 Ns.Z=0.8 N.X=1 N.Y=0 N.Z=0
+            Variance.R=3 Variance.G=0 Variance.B=16",
+            Some(4),
+            false,
+            true,
+        ),
+        (
+            "renderman",
+            "Ci.r=1 Ci.g=2 Ci.b=3 albedo.r=0.5 albedo.g=0.25 albedo.b=0.125 albedo_var.r=1 albedo_var.g=1 albedo_var.b=1
+            normal.X=0 normal.Y=0.6 normal.Z=0.8 mse.r=0.75 mse.g=0 mse.b=4 z.z=7",
+            Some(4),
+            true,
+            true,
+        ),
+        (
+            "arnold",
+            "R=1 G=2 B=3 denoise_albedo.R=0.5 denoise_albedo.G=0.25 denoise_albedo.B=0.125 N.X=0 N.Y=0.6 N.Z=0.8 Z.Z=7
+            variance.R=3 variance.G=0 variance.B=16",
+            Some(4),
+            true,
+            true,
+        ),
+        (
+            "luxcore",
+            "RGB_IMAGEPIPELINE.R=1 RGB_IMAGEPIPELINE.G=2 RGB_IMAGEPIPELINE.B=3 ALBEDO.R=0.5 ALBEDO.G=0.25 ALBEDO.B=0.125
+            AVG_SHADING_NORMAL.X=0 AVG_SHADING_NORMAL.Y=0.6 AVG_SHADING_NORMAL.Z=0.8 DEPTH.Z=7 SAMPLECOUNT.Y=4",
+            None,
+            true,
+            false,
+        ),
+    ];
 
     #[test]
     fn channels_of_other_programs_become_layers() {
-        let rgb = three(["R", "G", "B"], [1.0, 2.0, 3.0]);
-        let mitsuba = [
-            &rgb[..],
-            &three(["_arg_0.i.R", "_arg_0.i.G", "_arg_0.i.B"], [1.0, 2.0, 3.0]),
-            &three(["m2__arg_0.i.R", "m2__arg_0.i.G", "m2__arg_0.i.B"], [4.0, 4.0, 25.0]),
-            &three(["_arg_0.albedo.R", "_arg_0.albedo.G", "_arg_0.albedo.B"], [0.5, 0.25, 0.125]),
-            &three(["m2__arg_0.albedo.R", "m2__arg_0.albedo.G", "m2__arg_0.albedo.B"], [0.25, 0.25, 0.125]),
-            &three(["_arg_0.nn.X", "_arg_0.nn.Y", "_arg_0.nn.Z"], [0.0, 0.6, 0.8]),
-            &[("_arg_0.dd.y.T", 7.0), ("m2__arg_0.dd.y.T", 50.0)],
-        ]
-        .concat();
-        let cycles = [
-            three(["View Layer.Combined.R", "View Layer.Combined.G", "View Layer.Combined.B"], [9.0; 3]),
-            three(
-                ["View Layer.Noisy Image.R", "View Layer.Noisy Image.G", "View Layer.Noisy Image.B"],
-                [1.0, 2.0, 3.0],
-            ),
-            three(
-                ["View Layer.Denoising Albedo.R", "View Layer.Denoising Albedo.G", "View Layer.Denoising Albedo.B"],
-                [0.5, 0.25, 0.125],
-            ),
-            three(
-                ["View Layer.Denoising Normal.X", "View Layer.Denoising Normal.Y", "View Layer.Denoising Normal.Z"],
-                [0.0, 0.6, 0.8],
-            ),
-        ]
-        .concat();
-        let cycles =
-            [&cycles[..], &[("View Layer.Denoising Depth.Z", 7.0), ("View Layer.Debug Sample Count.X", 5.0)]].concat();
-        let pbrt = [
-            &rgb[..],
-            &three(["Albedo.R", "Albedo.G", "Albedo.B"], [0.5, 0.25, 0.125]),
-            &three(["Ns.X", "Ns.Y", "Ns.Z"], [0.0, 0.6, 0.8]),
-            &three(["N.X", "N.Y", "N.Z"], [1.0, 0.0, 0.0]),
-            &three(["Variance.R", "Variance.G", "Variance.B"], [3.0, 0.0, 16.0]),
-        ]
-        .concat();
-        for (name, channels, spp, depth) in
-            [("mitsuba", mitsuba, Some(5), true), ("cycles", cycles, None, true), ("pbrt", pbrt, Some(4), false)]
-        {
+        for &(name, text, spp, depth, variance) in FILES {
+            let channel = |part: &str| {
+                let (name, value) = part.split_once('=').unwrap();
+                // Spaces in names are written as slashes.
+                (name.replace('/', " "), value.parse().unwrap())
+            };
+            let channels: Vec<(String, f32)> = text.split_whitespace().map(channel).collect();
+            let channels: Vec<_> = channels.iter().map(|(name, value)| (name.as_str(), *value)).collect();
             let frame = frame(&channels, spp);
             let data = |layer| frame.get(layer).map(|image| image.data.clone());
             assert_eq!(data(Layer::Color), Some(vec![1.0, 2.0, 3.0]), "{name}");
             assert_eq!(data(Layer::Albedo), Some(vec![0.5, 0.25, 0.125]), "{name}");
             assert_eq!(data(Layer::Normal), Some(vec![0.0, 0.6, 0.8]), "{name}");
             assert_eq!(data(Layer::Depth).is_some_and(|depth| depth == [7.0]), depth, "{name}");
-            let variance = if name == "cycles" { None } else { Some(vec![0.75, 0.0, 4.0]) };
-            assert_eq!(data(Layer::ColorVariance), variance, "{name}");
-            assert_eq!(data(Layer::BinColor(3)).is_some(), variance.is_some(), "{name}");
-            assert!(data(Layer::AlbedoVariance).is_some() && data(Layer::NormalVariance).is_some(), "{name}");
+            let expected = variance.then(|| vec![0.75, 0.0, 4.0]);
+            assert_eq!(data(Layer::ColorVariance), expected, "{name}");
+            assert_eq!(data(Layer::BinColor(3)).is_some(), variance, "{name}");
+            let of_albedo = if name == "renderman" { 0.25 } else { 0.0 };
+            assert_eq!(data(Layer::AlbedoVariance).map(|data| data[0]), Some(of_albedo), "{name}");
+            assert!(data(Layer::NormalVariance).is_some(), "{name}");
         }
     }
 

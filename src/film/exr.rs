@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{Frame, Layer, LightLayers, Provenance, aovs, edge_layers};
+use super::{Frame, Layer, LightLayers, Provenance, aovs, edge_layers, views};
 use crate::error::{Error, Result};
 use crate::image::Image;
 use crate::image::io::{Kind, Pixels, read, write};
@@ -26,15 +26,24 @@ pub fn save(path: &Path, frame: &Frame) -> Result<()> {
     write(path, &Pixels { width, height, channels, data, window: frame.window, attributes }, Kind::Float, Some("zips"))
 }
 
-/// Reads the layers that a file has. Channels that belong to no layer are ignored.
-pub fn load(path: &Path) -> Result<Frame> {
-    load_counted(path, None)
+/// How files of other programs are read.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Reading<'a> {
+    /// Samples of every pixel, where the file does not say.
+    pub spp: Option<u32>,
+    /// The view layer to take, of a file of several; the first one if it is not given.
+    pub view_layer: Option<&'a str>,
 }
 
-/// The same of a file that may be another program's: its channels are layers as far as their names are known, and its
-/// pixels have `spp` samples where it does not say how many.
-pub fn load_counted(path: &Path, spp: Option<u32>) -> Result<Frame> {
-    let pixels = read(path, &Provenance::NAMES)?;
+/// Reads the layers that a file has. Channels that belong to no layer are ignored.
+pub fn load(path: &Path) -> Result<Frame> {
+    Ok(load_other(path, Reading::default())?.0)
+}
+
+/// The same of a file that may be another program's: its channels are layers as far as their names are known. Also gives a
+/// warning, if the file leaves a choice.
+pub fn load_other(path: &Path, reading: Reading) -> Result<(Frame, Option<String>)> {
+    let (pixels, warning) = one_view(path, read(path, &Provenance::NAMES)?, reading.view_layer)?;
     let mut frame = Frame::new(pixels.width, pixels.height);
     for layer in Layer::all() {
         let find = |name: &String| pixels.channels.iter().position(|other| other == name);
@@ -46,7 +55,7 @@ pub fn load_counted(path: &Path, spp: Option<u32>) -> Result<Frame> {
     }
     frame.provenance = Provenance::from_attributes(&pixels.attributes);
     if frame.provenance.version.is_empty() {
-        aovs::complete(&mut frame, &pixels, spp);
+        aovs::complete(&mut frame, &pixels, reading.spp);
     }
     if frame.get(Layer::Color).is_none() {
         return Err(Error::io(path, format!("no channels R, G, B among {}", pixels.channels.join(", "))));
@@ -60,5 +69,27 @@ pub fn load_counted(path: &Path, spp: Option<u32>) -> Result<Frame> {
     }
     frame.lights = LightLayers::of_file((frame.width, frame.height), &pixels.channels, channel);
     frame.window = pixels.window;
-    Ok(frame)
+    Ok((frame, warning))
+}
+
+/// The channels of one view layer, with a warning where there are others and none is asked for.
+fn one_view(path: &Path, pixels: Pixels, wanted: Option<&str>) -> Result<(Pixels, Option<String>)> {
+    let views = views::names(&pixels.channels);
+    let names = || views.join(", ");
+    let chosen = match (wanted, views.as_slice()) {
+        (None, [] | [_]) => return Ok((pixels, None)),
+        (None, [first, ..]) => first.clone(),
+        (Some(wanted), views) if views.iter().any(|view| view == wanted) => wanted.to_owned(),
+        (Some(wanted), []) => {
+            return Err(Error::Usage(format!("{} has no view layers, so none is `{wanted}`", path.display())));
+        }
+        (Some(wanted), _) => {
+            let what = format!("{} has no view layer `{wanted}`; it has {}", path.display(), names());
+            return Err(Error::Usage(what));
+        }
+    };
+    let warning = wanted.is_none().then(|| {
+        format!("{} has the view layers {}: `{chosen}` is taken; choose with --view-layer", path.display(), names())
+    });
+    Ok((views::only(pixels, &views, &chosen), warning))
 }

@@ -75,6 +75,18 @@ impl Frame {
         aovs::complete(self, &Pixels::default(), spp);
     }
 
+    /// The upper left corner of the frame's layers, at most so many pixels wide and high; without edges of its own.
+    pub fn corner(&self, side: usize) -> Self {
+        let (width, height) = (self.width.min(side), self.height.min(side));
+        let mut corner = Self { provenance: self.provenance.clone(), ..Self::new(width, height) };
+        for (layer, image) in self.present() {
+            let row = |y: usize| &image.data[y * self.width * image.channels..][..width * image.channels];
+            let data = (0..height).flat_map(row).copied().collect();
+            corner.set(layer, Image { width, height, channels: image.channels, data });
+        }
+        corner
+    }
+
     /// The same frame with its provenance.
     pub fn with_provenance(self, provenance: Provenance) -> Self {
         Self { provenance, ..self }
@@ -91,7 +103,8 @@ impl Frame {
             layer: layer.channel_names().join(", "),
             remedy: match layer.info().flag {
                 "always" if layer == Layer::ColorVariance => {
-                    "`fluxion render --layers` writes it, and Mitsuba where an integrator `moment` is around the others"
+                    "`fluxion render --layers` writes it, Mitsuba where an integrator `moment` is around the others, and \
+                     pbrt's `gbuffer` film"
                         .into()
                 }
                 "always" if layer == Layer::Samples => "give the samples per pixel with --spp".into(),

@@ -22,6 +22,7 @@ mod source;
 mod statistic;
 mod stored;
 mod tile;
+mod views;
 
 pub use self::edges::{Cross, EdgeParts, Edges, HalfEdge};
 pub use self::frame::{Frame, half};

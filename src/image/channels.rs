@@ -68,13 +68,16 @@ const BEAUTY: &[&str] = &["combined", "beauty", "rgba"];
 /// Names of a single channel of luminance.
 const GREY: &[&str] = &["y", "l", "i", "grey", "gray", "luminance"];
 
+/// Names of a single channel that is taken for grey: those of luminance, red alone, and masks.
+const ALONE: &[&str] = &["y", "l", "i", "grey", "gray", "luminance", "r", "a"];
+
 impl ColorChannels {
     /// The colours of a file: R, G and B, or X, Y and Z, or grey, with or without alpha; if all its channels belong to one
     /// layer, that layer's.
     pub fn of(file: &ImageFile, path: &Path, integers: Integers) -> Result<Self> {
         let (order, is_xyz) = choose(&file.channels).ok_or_else(|| {
             let names = file.channels.join(", ");
-            Error::io(path, format!("its colours cannot be told from the channels {names}; give it R, G and B, or Y"))
+            Error::io(path, format!("its colours cannot be told from the channels {names}; give it R, G and B, or Y, or one layer of them"))
         })?;
         let own = || file.attribute("chromaticities").and_then(|text| primaries(&text));
         let is_grey = order[0] == order[1];
@@ -155,15 +158,21 @@ fn choose(channels: &[String]) -> Option<([usize; 3], bool)> {
     let mut layers: Vec<_> = parts.iter().map(|(layer, _)| layer.as_str()).filter(|layer| !layer.is_empty()).collect();
     layers.sort_unstable();
     layers.dedup();
-    match (of_layer(""), channels.len(), layers.as_slice()) {
+    match (of_layer(""), parts.as_slice(), layers.as_slice()) {
         (Some(found), ..) => Some(found),
-        (None, 1, _) => Some(([0; 3], false)),
+        (None, [(_, only)], _) => ALONE.contains(&only.as_str()).then_some(([0; 3], false)),
         (None, _, [layer]) if parts.iter().all(|(other, _)| other == layer) => of_layer(layer),
-        // Of several layers the picture itself, as Blender and compositors name it.
-        (None, _, layers) => BEAUTY.iter().find_map(|name| {
-            let mut named = layers.iter().filter(|layer| layer.rsplit('.').next() == Some(name));
-            named.find_map(|layer| of_layer(layer))
-        }),
+        // Of several layers the picture itself, as Blender and compositors name it, or the only one with colours.
+        (None, _, layers) => {
+            let beauty = |layer: &&&str| BEAUTY.contains(&layer.rsplit('.').next().unwrap_or_default());
+            let named: Vec<_> = layers.iter().filter(beauty).filter_map(|layer| of_layer(layer)).collect();
+            let colored = layers.iter().filter_map(|layer| of_layer(layer)).filter(|(order, _)| order[0] != order[1]);
+            let colored: Vec<_> = colored.filter(|(_, is_xyz)| !is_xyz).collect();
+            match (named.as_slice(), colored.as_slice()) {
+                ([found], _) | ([], [found]) => Some(*found),
+                _ => None,
+            }
+        }
     }
 }
 
@@ -206,7 +215,17 @@ mod tests {
             ("X Y Z", Some(([0, 1, 2], true))),
             ("Y", Some(([0; 3], false))),
             ("A Y", Some(([1; 3], false))),
-            ("depth", Some(([0; 3], false))),
+            ("depth", None),
+            ("Z", None),
+            ("depth.Z", None),
+            ("R", Some(([0; 3], false))),
+            ("depth.Z rgba.R rgba.G rgba.B", Some(([1, 2, 3], false))),
+            ("depth.Z N.X N.Y N.Z main.B main.G main.R", Some(([6, 5, 4], false))),
+            ("depth.Z N.X N.Y N.Z", None),
+            (
+                "back.Combined.R back.Combined.G back.Combined.B front.Combined.R front.Combined.G front.Combined.B",
+                None,
+            ),
             ("R G B depth.Z normal.X", Some(([0, 1, 2], false))),
             ("R G", None),
             ("U V", None),

@@ -1,19 +1,76 @@
 //! Image files, through OpenImageIO or, in builds without it, through libraries in Rust: colour images in and out, with the
 //! encoding each format expects.
 
+use std::ops::Deref;
 use std::path::Path;
 
 use super::Image;
 use super::channels::{ColorChannels, Integers};
 #[cfg(not(feature = "openimageio"))]
 use super::pure as library;
+use super::radiance::Radiance;
 use crate::error::{Error, Result};
 #[cfg(feature = "openimageio")]
 use crate::ffi::oiio as library;
 use crate::files;
 use crate::math::srgb_encode;
 pub use crate::pixels::{DataWindow, Header, Kind, OpenImage, Pixels, Storage};
-pub use library::{CachedTexture, ImageFile, TextureSystem, failed_lookups};
+pub use library::{CachedTexture, TextureSystem, failed_lookups};
+
+/// An image file whose header has been read.
+pub enum ImageFile<'a> {
+    /// By a library.
+    Library(library::ImageFile<'a>),
+    /// A Radiance file of a kind that libraries leave out.
+    Radiance(Radiance),
+}
+
+impl<'a> ImageFile<'a> {
+    /// Reads the header.
+    pub fn open(path: &'a Path) -> Result<Self> {
+        if std::fs::metadata(path).map_err(|error| Error::io(path, error))?.len() == 0 {
+            return Err(Error::io(path, "the file is empty"));
+        }
+        match Radiance::open(path)? {
+            Some(file) => Ok(Self::Radiance(file)),
+            None => library::ImageFile::open(path).map(Self::Library),
+        }
+    }
+
+    /// Whether [`CachedTexture`] reads the same: not of files of several parts, of which it knows the first.
+    pub fn can_be_cached(&self) -> bool {
+        matches!(self, Self::Library(file) if file.parts <= 1)
+    }
+
+    fn file(&self) -> &dyn OpenImage<Target = Header> {
+        match self {
+            Self::Library(file) => file,
+            Self::Radiance(file) => file,
+        }
+    }
+}
+
+impl Deref for ImageFile<'_> {
+    type Target = Header;
+
+    fn deref(&self) -> &Header {
+        self.file()
+    }
+}
+
+impl OpenImage for ImageFile<'_> {
+    fn attribute(&self, name: &str) -> Option<String> {
+        self.file().attribute(name)
+    }
+
+    fn floats(&self) -> Result<Vec<f32>> {
+        self.file().floats()
+    }
+
+    fn bytes(&self) -> Result<Vec<u8>> {
+        self.file().bytes()
+    }
+}
 
 /// Formats that hold linear radiance as floats.
 const LINEAR: &[&str] = &["exr", "hdr", "pfm", "tif", "tiff"];
@@ -121,11 +178,13 @@ pub struct Picture {
     pub color: Image,
     /// Share of every pixel that is covered.
     pub alpha: Option<Image>,
+    /// The larger picture that it is a part of, if it is.
+    pub window: Option<DataWindow>,
 }
 
 impl From<Image> for Picture {
     fn from(color: Image) -> Self {
-        Self { color, alpha: None }
+        Self { color, alpha: None, window: None }
     }
 }
 
@@ -145,7 +204,7 @@ pub fn read_picture(path: &Path) -> Result<Picture> {
         alpha.extend(covered);
     }
     let image = |channels, data| Image { width: file.width, height: file.height, channels, data };
-    Ok(Picture { color: image(3, color), alpha: at.map(|_| image(1, alpha)) })
+    Ok(Picture { color: image(3, color), alpha: at.map(|_| image(1, alpha)), window: file.window })
 }
 
 /// Reads the colours of an image file as linear RGB, multiplied by its alpha if it has one.
@@ -305,7 +364,7 @@ mod tests {
             // Multiplied by alpha, no colour is brighter than that.
             let dimmed = Image { data: image.data.iter().map(|value| 0.5 * value).collect(), ..image.clone() };
             write_color(&path, &dimmed, &extras).unwrap();
-            let Picture { color, alpha: back } = read_picture(&path).unwrap();
+            let Picture { color, alpha: back, .. } = read_picture(&path).unwrap();
             let far = |a: &Image, b: &Image| a.data.iter().zip(&b.data).any(|(a, b)| (a - b).abs() > tolerance);
             assert!(!far(&color, &dimmed) && !far(&back.unwrap(), &alpha), "{name}");
         }

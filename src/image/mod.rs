@@ -8,6 +8,7 @@ pub mod oidn;
 pub mod planes;
 #[cfg(any(test, not(feature = "openimageio")))]
 mod pure;
+mod radiance;
 
 use crate::math::{Rgb, vec3};
 

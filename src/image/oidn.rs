@@ -19,30 +19,33 @@ pub fn check() -> Result<()> {
     oidn::check().map_err(|what| Error::backend("open image denoise", what))
 }
 
-/// Denoises linear radiance by networks of some quality, with the help of albedo and normal, in about so many bytes of `memory`,
-/// which changes no bit.
+/// Denoises linear radiance by networks of some quality, with the help of albedo and normal if there are any, and of the latter
+/// beside the former only; in about so many bytes of `memory`, which changes no bit.
 pub fn denoise(
     color: &Image,
-    [albedo, normal]: [&Image; 2],
+    [albedo, normal]: [Option<&Image>; 2],
     (quality, features): (Quality, Features),
     memory: Option<u64>,
 ) -> Result<Image> {
+    let images = albedo.iter().map(|image| (c"albedo", &image.data));
+    let images: Vec<_> = images.chain(albedo.and(normal).map(|image| (c"normal", &image.data))).collect();
     let size = (color.width, color.height);
     let run = || {
         let device = Device::new(rayon::current_num_threads(), memory)?;
         let color = (c"color", color.data.as_slice());
-        let data = match features {
-            Features::Noisy => {
-                let inputs = [color, (c"albedo", &albedo.data), (c"normal", &normal.data)];
-                device.filter(size, &inputs, &[c"hdr"], quality)?
-            }
-            Features::Prefiltered(smaller) => {
-                let albedo = device.filter(size, &[(c"albedo", &albedo.data)], &[], smaller)?;
-                let normal = device.filter(size, &[(c"normal", &normal.data)], &[], smaller)?;
-                let inputs = [color, (c"albedo", &albedo), (c"normal", &normal)];
-                device.filter(size, &inputs, &[c"hdr", c"cleanAux"], quality)?
-            }
+        let cleaned: Vec<_> = match features {
+            Features::Noisy => Vec::new(),
+            Features::Prefiltered(smaller) => images
+                .iter()
+                .map(|&(name, data)| Ok((name, device.filter(size, &[(name, data)], &[], smaller)?)))
+                .collect::<Result<_, String>>()?,
         };
+        let (cleaned, flags): (Vec<_>, &[_]) = match cleaned.as_slice() {
+            [] => (images.iter().map(|&(name, data)| (name, data.as_slice())).collect(), &[c"hdr"]),
+            cleaned => (cleaned.iter().map(|(name, data)| (*name, data.as_slice())).collect(), &[c"hdr", c"cleanAux"]),
+        };
+        let inputs: Vec<_> = std::iter::once(color).chain(cleaned).collect();
+        let data = device.filter(size, &inputs, flags, quality)?;
         Ok(Image { data, ..Image::new(size.0, size.1, 3) })
     };
     run().map_err(|what: String| Error::backend("open image denoise", what))

@@ -1,6 +1,7 @@
 //! Pixels as image files hold them, and what their headers say: the same for every library that reads and writes them.
 
 pub mod exr_header;
+pub mod parts;
 
 use std::ops::Deref;
 use std::path::Path;
@@ -72,6 +73,8 @@ pub struct Header {
     pub window: Option<DataWindow>,
     /// OpenImageIO's name of the format, as in `openexr`.
     pub format: String,
+    /// Number of the file's parts.
+    pub parts: usize,
 }
 
 /// An image file whose header has been read.

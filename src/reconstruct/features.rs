@@ -2,7 +2,7 @@
 
 use super::inputs::Inputs;
 use crate::error::Result;
-use crate::film::Layer;
+use crate::film::{Frame, Layer};
 use crate::image::nl_means::Guide;
 use crate::image::planes::{PlaneTile, Planes};
 use crate::math::lanes::Lanes;
@@ -34,6 +34,13 @@ impl Kind {
             Self::Normal => [Layer::Normal, Layer::NormalVariance],
         }
     }
+}
+
+/// The warning that a method does without features that a frame lacks, of those that it takes.
+pub fn without_features<const N: usize>(frame: &Frame, method: &str, taken: [Layer; N]) -> Vec<String> {
+    let missing: Vec<_> = taken.iter().filter(|&&layer| frame.get(layer).is_none()).map(|layer| layer.name()).collect();
+    let what = || format!("the frame lacks {}: {method} works without, and keeps fewer edges", missing.join(", "));
+    if missing.is_empty() { Vec::new() } else { vec![what()] }
 }
 
 /// Beyond two pixels the weights of [`Feature::clean`] are e^-9 or less.

@@ -63,9 +63,10 @@ impl<'a> Inputs<'a> {
         })
     }
 
-    /// Share of every pixel that is covered, if the frame has it.
+    /// Share of every pixel that is covered, if the frame has it with its noise: otherwise it is taken as it is.
     pub fn alpha(&self) -> Result<Option<Planes>> {
-        self.frame.get(Layer::Alpha).map(|_| self.planes(Layer::Alpha, 1.0)).transpose()
+        let has = self.frame.get(Layer::Alpha).and(self.frame.get(Layer::AlphaVariance)).is_some();
+        has.then(|| self.planes(Layer::Alpha, 1.0)).transpose()
     }
 
     /// A filtered alpha, no further from the sampled one than its noise: what is opaque in every sample stays so.
@@ -159,20 +160,12 @@ impl<'a> Inputs<'a> {
 }
 
 /// Fails if a method that takes so many bytes for every pixel may not.
-pub fn check_memory(frame: &Frame, context: &Context, method: &str, bytes: u64) -> Result<()> {
-    let needed = (bytes * (frame.width * frame.height) as u64).div_ceil(1 << 20);
+pub fn check_memory(frame: &Frame, context: &Context, method: &'static str, bytes: u64) -> Result<()> {
+    let (size, bytes) = ((frame.width, frame.height), bytes * (frame.width * frame.height) as u64);
     match context.memory {
-        Some(memory) if memory < needed << 20 => Err(too_little(method, (frame.width, frame.height), needed)),
+        Some(memory) if memory < bytes => Err(Error::TooLittleMemory { method, size, bytes }),
         _ => Ok(()),
     }
-}
-
-/// The error of a method that needs so many megabytes.
-pub fn too_little(method: &str, (width, height): (usize, usize), megabytes: u64) -> Error {
-    Error::Usage(format!(
-        "reconstructing {width}x{height} pixels with {method} takes {megabytes} MB besides the layers; allow it with \
-         --max-memory {megabytes}"
-    ))
 }
 
 /// Three channels of planes from `first` on, pixel by pixel, as solvers take them.

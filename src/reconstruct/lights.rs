@@ -11,7 +11,6 @@ use crate::image::Image;
 
 /// Method whose weights filter the groups' light where a method has none of its own.
 const FILTER: &str = "nlm:window=6";
-const WITHOUT_FEATURES: &str = "nlm:window=6,features=off";
 /// Times that they do: single bright samples of a group become hills instead of squares as large as the window.
 const PASSES: usize = 2;
 
@@ -24,8 +23,7 @@ pub fn groups(method: &dyn Reconstruction, frame: &Frame, solution: &Solution) -
     let filtered = match method.filter(frame, &all)? {
         Some(filtered) => filtered,
         None => {
-            let features = frame.get(Layer::Albedo).and(frame.get(Layer::Normal)).is_some();
-            let filter = parse(if features { FILTER } else { WITHOUT_FEATURES })?;
+            let filter = parse(FILTER)?;
             (0..PASSES).try_fold(all, |all, _| Ok::<_, Error>(filter.filter(frame, &all)?.unwrap_or(all)))?
         }
     };

@@ -73,6 +73,17 @@ pub struct Context<'a> {
 }
 
 impl Context<'_> {
+    /// Runs a part of a method within the memory that is left beside so many bytes that are held; what it lacks is told with
+    /// them.
+    fn beside<T>(&self, held: u64, work: impl FnOnce(Option<u64>) -> Result<T>) -> Result<T> {
+        work(self.memory.map(|memory| memory.saturating_sub(held))).map_err(|error| match error {
+            Error::TooLittleMemory { method, size, bytes } => {
+                Error::TooLittleMemory { method, size, bytes: bytes + held }
+            }
+            other => other,
+        })
+    }
+
     /// No progress, no limit, no intermediate images.
     pub const QUIET: Self = Self { progress: &|_, _| {}, memory: None, notes: false };
 }
@@ -95,6 +106,11 @@ pub trait Reconstruction: Send + Sync {
     /// A quicker method with much the same error, if there is one: it serves between passes of adaptive sampling.
     fn guide(&self) -> Option<&dyn Reconstruction> {
         None
+    }
+
+    /// Warnings about what a frame lacks that the method does without.
+    fn warnings(&self, _frame: &Frame) -> Vec<String> {
+        Vec::new()
     }
 
     /// Shares of the scattered radiance, filtered by the weights that the method filters the colours by; none where it has no such
@@ -204,6 +220,14 @@ pub fn parse(text: &str) -> Result<Box<dyn Reconstruction>> {
         Error::Usage(format!("method `{id}` is not known; there are {}", names.join(", ")))
     })?;
     (method.make)(&Parameters::parse(method, values)?)
+}
+
+/// Names of the methods that find all that they need in a frame.
+pub fn possible(frame: &Frame) -> Vec<&'static str> {
+    let corner = frame.corner(16);
+    let works =
+        |method: &&Method| parse(method.id).is_ok_and(|made| made.reconstruct(&corner, &Context::QUIET).is_ok());
+    METHODS.iter().filter(works).map(|method| method.id).collect()
 }
 
 /// Checks the values of edges that are none of a layer.

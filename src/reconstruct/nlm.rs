@@ -1,7 +1,7 @@
 //! Non-local means (Buades et al. 2005, with the distance of Rousselle et al. 2012), of the colour alone or with
 //! features. It needs no gradients.
 
-use super::features::{Feature, Kind};
+use super::features::{Feature, Kind, without_features};
 use super::inputs::{Inputs, check_memory};
 use super::{Context, Method, Parameter, Parameters, Reconstruction, Solution, Traits};
 use crate::error::Result;
@@ -46,6 +46,9 @@ fn make(parameters: &Parameters) -> Result<Box<dyn Reconstruction>> {
     }))
 }
 
+/// Features that pixels are compared by.
+const KINDS: [Kind; 2] = [Kind::Albedo, Kind::Normal];
+
 struct Nlm {
     features: bool,
     settings: NlmSettings,
@@ -56,7 +59,8 @@ impl Nlm {
     fn guides(&self, inputs: &Inputs) -> Result<Guides> {
         let mut features = Vec::new();
         if self.features {
-            for kind in [Kind::Albedo, Kind::Normal] {
+            let has = |kind: &Kind| kind.layers().iter().all(|&layer| inputs.frame.get(layer).is_some());
+            for kind in KINDS.into_iter().filter(has) {
                 features.push(Feature::of(kind, inputs)?.guide());
             }
         }
@@ -67,6 +71,10 @@ impl Nlm {
 impl Reconstruction for Nlm {
     fn needs(&self) -> Needs {
         Needs { features: self.features, ..Needs::default() }
+    }
+
+    fn warnings(&self, frame: &Frame) -> Vec<String> {
+        if self.features { without_features(frame, METHOD.id, KINDS.map(|kind| kind.layers()[0])) } else { Vec::new() }
     }
 
     fn filter(&self, frame: &Frame, shares: &Planes) -> Result<Option<Planes>> {

@@ -1,5 +1,6 @@
 //! Open Image Denoise (Intel, 2018 on), a trained network, for comparison. It needs no gradients.
 
+use super::features::without_features;
 use super::{Context, Method, Parameter, Parameters, Reconstruction, Solution, Traits};
 use crate::error::Result;
 use crate::film::{Frame, Layer, Needs};
@@ -56,6 +57,10 @@ impl Reconstruction for Oidn {
         Needs { features: true, ..Needs::default() }
     }
 
+    fn warnings(&self, frame: &Frame) -> Vec<String> {
+        without_features(frame, "oidn", [Layer::Albedo, Layer::Normal])
+    }
+
     fn reconstruct(&self, frame: &Frame, context: &Context) -> Result<Solution> {
         let direct = frame.get(Layer::Direct).filter(|_| self.direct);
         let image = clean(frame, direct, self.networks, context.memory)?;
@@ -63,7 +68,7 @@ impl Reconstruction for Oidn {
     }
 }
 
-/// A frame's scattered light, denoised: together with the light of directly seen emitters, if that is given, which is
+/// A frame's scattered light, denoised with the features that it has: together with the light of directly seen emitters, if that is given, which is
 /// subtracted again, since it is added to every method's image. The library takes about so many bytes of `memory`.
 pub fn clean(
     frame: &Frame,
@@ -71,10 +76,9 @@ pub fn clean(
     networks: (Quality, Features),
     memory: Option<u64>,
 ) -> Result<Image> {
-    let (albedo, normal) = (frame.require(Layer::Albedo)?, frame.require(Layer::Normal)?);
     let mut color = frame.require(Layer::Color)?.clone();
     direct.iter().for_each(|direct| color.add(direct));
-    let mut image = denoise(&color, [albedo, normal], networks, memory)?;
+    let mut image = denoise(&color, [Layer::Albedo, Layer::Normal].map(|layer| frame.get(layer)), networks, memory)?;
     direct.iter().for_each(|direct| {
         image.data.iter_mut().zip(&direct.data).for_each(|(value, direct)| *value -= direct);
     });

@@ -32,7 +32,7 @@ pub fn worst(map: &Image) -> f32 {
 /// The picture as FLIP sees it: each channel x / (1 + x), then sRGB. What shows through lies on a checkerboard.
 pub fn tone_mapped(picture: &Picture) -> Image {
     let compress = |value: f32| value.max(0.0) / (1.0 + value.max(0.0));
-    let Picture { color, alpha } = picture;
+    let Picture { color, alpha, .. } = picture;
     Image::from_rgb(color.width, color.height, |x, y| {
         let behind = if (x / SQUARE + y / SQUARE).is_multiple_of(2) { 0.25 } else { 0.4 };
         let uncovered = alpha.as_ref().map_or(0.0, |alpha| 1.0 - alpha.pixel(x, y)[0]);

@@ -196,6 +196,7 @@ impl Placement {
             frame,
             dp_du: self.to_world.transform_vector3(local.dp_du),
             dp_dv: self.to_world.transform_vector3(local.dp_dv),
+            curvature: local.curvature * self.to_world.x_axis.truncate().length(),
             wi: frame.to_local(-ray.direction),
             ..local
         }

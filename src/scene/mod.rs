@@ -17,6 +17,8 @@ pub mod texture;
 
 use std::sync::Arc;
 
+use glam::DVec3;
+
 use self::accel::Accel;
 use self::bsdf::Bsdf;
 use self::emitter::{Choice, Emitter, LightPoint};
@@ -100,10 +102,14 @@ pub struct SceneDescription {
     pub emitters: Vec<Box<dyn Emitter>>,
     /// Their ids, those of their shapes, or their types and lines.
     pub emitter_names: Vec<Arc<str>>,
+    /// Factors of their chances to be sampled.
+    pub emitter_weights: Vec<f32>,
     /// The camera.
     pub sensor: Sensor,
     /// Path depths.
     pub integrator: Integrator,
+    /// The file's position of the origin that all coordinates are measured from.
+    pub origin: DVec3,
     /// Hash of the scene's text.
     pub fingerprint: u64,
     /// Mesh and image files that it was read from.
@@ -132,6 +138,7 @@ pub struct Scene {
     envmap: Option<u32>,
     sensor: Sensor,
     integrator: Integrator,
+    origin: DVec3,
     fingerprint: u64,
     files: Vec<PathBuf>,
     sensors: Vec<SensorInfo>,
@@ -151,7 +158,7 @@ impl Scene {
             return Err(crate::error::Error::BadData(what.into()));
         }
         emitters.iter_mut().for_each(|emitter| emitter.enclose(accel.bounds()));
-        let emitter_choice = Choice::new(&emitters);
+        let emitter_choice = Choice::new(&emitters, &parts.emitter_weights);
         let chance = |index| emitter_choice.as_ref().and_then(|choice| choice.constant(index));
         let emitter_infos =
             emitters.iter().enumerate().map(|(i, emitter)| EmitterInfo::new(&**emitter, chance(i))).collect();
@@ -171,6 +178,7 @@ impl Scene {
             envmap,
             sensor,
             integrator,
+            origin: parts.origin,
             fingerprint,
             files,
             sensors: parts.sensors,
@@ -294,6 +302,11 @@ impl Scene {
     /// Whether an environment surrounds the scene.
     pub fn has_environment(&self) -> bool {
         self.environment.is_some()
+    }
+
+    /// The file's position of the origin that coordinates here are measured from: zero, but for scenes far away from it.
+    pub fn origin(&self) -> DVec3 {
+        self.origin
     }
 
     /// The box around all shapes.

@@ -20,6 +20,8 @@ pub struct Surface {
     pub dp_dv: Vec3,
     /// How far rays start off the surface, so that they do not meet it again.
     pub epsilon: f32,
+    /// Radius of an exactly curved surface, positive where the normal points away from the centre; zero of others.
+    pub curvature: f32,
     /// Direction back to where the ray came from, in the shading frame.
     pub wi: Vec3,
 }
@@ -29,7 +31,17 @@ impl Default for Surface {
     fn default() -> Self {
         let (zero, up) = (Vec3::ZERO, Vec3::Z);
         let frame = Frame { s: Vec3::X, t: Vec3::Y, n: up };
-        Self { p: zero, n: up, frame, at: texture::Point::default(), dp_du: zero, dp_dv: zero, epsilon: 0.0, wi: up }
+        Self {
+            p: zero,
+            n: up,
+            frame,
+            at: texture::Point::default(),
+            dp_du: zero,
+            dp_dv: zero,
+            epsilon: 0.0,
+            curvature: 0.0,
+            wi: up,
+        }
     }
 }
 
@@ -51,9 +63,16 @@ pub fn offset(p: Vec3, n: Vec3, epsilon: f32, direction: Vec3) -> Vec3 {
 }
 
 impl Surface {
-    /// Origin of rays that leave along `direction`.
+    /// Origin of rays that leave along `direction`, of any length. Inside of a curved surface it is on the ray through the
+    /// point itself: off it, light that is reflected again and again would meet the surface more and more steeply. Rays so
+    /// grazing that they would start near their other end start as those of other surfaces.
     #[inline]
     pub fn leave(&self, direction: Vec3) -> Vec3 {
+        let cosine = self.n.dot(direction);
+        let room = cosine * cosine * self.curvature.abs();
+        if cosine * self.curvature < 0.0 && room > 2.0 * self.epsilon * direction.length_squared() {
+            return self.p + direction * (self.epsilon / cosine.abs());
+        }
         offset(self.p, self.n, self.epsilon, direction)
     }
 

@@ -34,7 +34,7 @@ fn file(version: &str, body: &str) -> String {
 }
 
 /// Scattered light and what the camera sees directly, of every pixel.
-fn pixels(film: &Film) -> Vec<[f32; 3]> {
+pub fn pixels(film: &Film) -> Vec<[f32; 3]> {
     let frame = film.develop();
     let (color, direct) = (frame.get(Layer::Color).unwrap(), frame.get(Layer::Direct).unwrap());
     let pixel = |i: usize| [0, 1, 2].map(|c: usize| color.data[3 * i + c] + direct.data[3 * i + c]);
@@ -566,4 +566,111 @@ fn shared_examples_have_their_values() {
     let alpha = &frame.get(Layer::Alpha).unwrap().data;
     assert!(alpha[8 * 16 + 8] == 1.0 && alpha[0] == 0.0);
     assert!((alpha.iter().sum::<f32>() / 256.0 - 0.349).abs() < 5e-3, "{}", alpha.iter().sum::<f32>() / 256.0);
+}
+
+#[test]
+fn left_over_properties_of_old_files_are_warnings() {
+    let body = "<shape type=\"Sphere\"><bsdf type=\"dielectric\"><float name=\"alpha\" value=\"0.1\"/></bsdf></shape>
+        <emitter type=\"constant\"/>";
+    for version in ["0.5.0", "0.6.0"] {
+        let scene = text(&file(version, body));
+        near(centre_and_corner(&scene).0, [1.0; 3], version);
+        let warned = scene.warnings().iter().filter(|warning| warning.contains("`dielectric` has no property `alpha`"));
+        assert_eq!(warned.count(), 1, "{:?}", scene.warnings());
+        let strict = load::Options { strict: true, ..load::Options::default() };
+        assert!(scene_of(&[("scene.xml", file(version, body).as_bytes())], &strict).is_err());
+    }
+    for version in ["2.1.0", "3.0.0"] {
+        assert!(try_text(&file(version, body)).err().unwrap().to_string().contains("no property `alpha`"));
+    }
+    // Something nested that has a meaning there and none here is still an error.
+    let nested = "<shape type=\"sphere\"><medium type=\"homogeneous\"/></shape>";
+    assert!(try_text(&file("0.6.0", nested)).is_err());
+}
+
+#[test]
+fn ascii_meshes_are_words_between_white_space() {
+    let header = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
+        element face 2\nproperty list uchar int vertex_indices\nend_header\n";
+    let body = "-1 -1 0\n1 -1 0\n1 1 0\n-1 1 0\n3 0 1 2\n3 0 2 3\n";
+    let scene = file(
+        "3.0.0",
+        "<shape type=\"ply\"><string name=\"filename\" value=\"m.ply\"/></shape><emitter type=\"constant\"/>",
+    );
+    let load = |body: &str| {
+        let mesh = format!("{header}{body}");
+        scene_of(&[("scene.xml", scene.as_bytes()), ("m.ply", mesh.as_bytes())], &load::Options::default())
+    };
+    for body in [
+        body.to_owned(),
+        body.replace("3 0 1 2", "\n \n3 0 1 2"),
+        body.replace('\n', " "),
+        body.replace(' ', "\n"),
+        body.replace('\n', "\r\n").replace(' ', "\t  "),
+    ] {
+        near(centre_and_corner(&load(&body).unwrap()).0, [0.5; 3], &body);
+    }
+    for (body, expected) in
+        [("1 2 3", "ends in entry 1 of 4 of `vertex`"), (&body.replace("3 0 1 2", "x"), "has `x` values")]
+    {
+        let message = load(body).err().unwrap().to_string();
+        assert!(message.contains(expected), "{message}");
+    }
+}
+
+#[test]
+fn corners_that_are_not_finite_are_told() {
+    let mesh = "v -1 -1 0\nv 1 -1 0\nv nan 1 0\nv -1 1 0\nf 1 2 4\nf 2 3 4\nf 3 4 1\n";
+    let scene = file(
+        "3.0.0",
+        "<shape type=\"obj\"><string name=\"filename\" value=\"m.obj\"/></shape><emitter type=\"constant\"/>",
+    );
+    let files = [("scene.xml", scene.as_bytes()), ("m.obj", mesh.as_bytes())];
+    let loaded = scene_of(&files, &load::Options::default()).unwrap();
+    let warning = loaded.warnings().join("\n");
+    assert!(
+        warning.contains("m.obj: 2 of 3 triangles have a corner that is not finite, the first is number 1"),
+        "{warning}"
+    );
+    assert!(scene_of(&files, &load::Options { strict: true, ..load::Options::default() }).is_err());
+}
+
+#[test]
+fn weights_of_emitters_change_the_noise_and_not_the_mean() {
+    let lit = |weights: [&str; 2]| {
+        let lamp = |x: &str, weight: &str| {
+            format!(
+            "<shape type=\"rectangle\"><transform name=\"to_world\"><scale value=\"0.3\"/><rotate y=\"1\" angle=\"180\"/>
+            <translate x=\"{x}\" z=\"2\"/></transform><emitter type=\"area\">
+            <float name=\"sampling_weight\" value=\"{weight}\"/></emitter></shape>"
+        )
+        };
+        text(&file("3.0.0", &format!("<shape type=\"rectangle\"/>{}{}", lamp("-1", weights[0]), lamp("1", weights[1]))))
+    };
+    let mean = |scene: &Scene| {
+        let all = pixels(&film(scene, 512, 1, Needs::default()));
+        all.iter().map(|pixel| pixel[0]).sum::<f32>() / all.len() as f32
+    };
+    let expected = mean(&lit(["1", "1"]));
+    for weights in [["1", "9"], ["0", "1"], ["0", "0"]] {
+        let found = mean(&lit(weights));
+        assert!((found / expected - 1.0).abs() < 0.03, "{weights:?}: {found}, not {expected}");
+    }
+    let dark = text(&file(
+        "3.0.0",
+        "<shape type=\"rectangle\"/><emitter type=\"point\"><point name=\"position\" z=\"1\"/>
+        <float name=\"sampling_weight\" value=\"0\"/></emitter>",
+    ));
+    assert!(dark.warnings()[0].contains("`sampling_weight` of 0 gives no light") && mean(&dark) == 0.0);
+    let negative = "<emitter type=\"constant\"><float name=\"sampling_weight\" value=\"-1\"/></emitter>";
+    assert!(try_text(&file("3.0.0", negative)).is_err());
+}
+
+#[test]
+fn a_camera_that_cuts_everything_off_is_warned_of() {
+    let near = file("3.0.0", "<shape type=\"sphere\"/>")
+        .replace("name=\"fov\" value=\"40\"/>", "name=\"fov\" value=\"40\"/><float name=\"near_clip\" value=\"50\"/>");
+    let scene = text(&near);
+    assert!(scene.warnings()[0].contains("nothing is between the camera's near_clip 50 and its far_clip 10000"));
+    assert!(text(&file("3.0.0", "<shape type=\"sphere\"/>")).warnings().is_empty());
 }

@@ -206,9 +206,10 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         // While the scene is read, too: what is to be resumed must not look as if it had failed.
         stop_on_signal()?;
     }
-    let _claims = Claims::new(
+    let _claims = Claims::of_layers(
         &args.output,
-        &[&args.layers, &args.json, &args.cryptomatte, &args.checkpoint.checkpoint],
+        &[&args.layers, &args.cryptomatte],
+        &[&args.json, &args.checkpoint.checkpoint],
         &[&args.scene],
     )?;
     let mut stats = Stats { method: args.method.method.clone(), ..Stats::default() };

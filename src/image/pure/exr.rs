@@ -1,4 +1,4 @@
-//! OpenEXR files: the first part, at its full resolution.
+//! OpenEXR files, at their full resolution.
 
 use std::collections::HashMap;
 use std::fs::File;
@@ -8,12 +8,13 @@ use std::path::Path;
 use exr::image::write::WritableImage;
 use exr::image::{AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer};
 use exr::meta::MetaData;
-use exr::meta::attribute::{AttributeValue, IntegerBounds, SampleType, Text};
+use exr::meta::attribute::{AttributeValue, IntegerBounds, SampleType};
 use exr::meta::header::LayerAttributes;
 use exr::prelude::{Blocks, Compression, LineOrder, ReadChannels, ReadLayers, f16, read};
 
 use super::{Format, Samples};
 use crate::error::{Error, Result};
+use crate::pixels::parts::{self, Merged, Part};
 use crate::pixels::{DataWindow, Header, Kind, Pixels, Storage};
 
 /// Number that exr files begin with.
@@ -25,18 +26,38 @@ pub fn is_exr(path: &Path) -> bool {
     File::open(path).and_then(|mut file| file.read_exact(&mut magic)).is_ok() && magic == MAGIC
 }
 
-/// Strings of a header.
-struct Exr(HashMap<String, String>);
+/// Strings of the headers, and numbers of the parts that are read.
+struct Exr {
+    strings: HashMap<String, String>,
+    parts: Vec<usize>,
+}
 
-/// Reads a header.
+/// Reads the headers of all parts.
 pub fn open(path: &Path) -> Result<(Header, Box<dyn Format>)> {
     let found = MetaData::read_from_file(path, false).map_err(|error| Error::io(path, error))?;
-    let part = found.headers.first().ok_or_else(|| Error::io(path, "the file has no part"))?;
-    if part.deep {
-        return Err(Error::io(path, "volumes and deep images are not supported"));
+    let parts: Vec<_> = found.headers.iter().map(part).collect();
+    let merged = parts::merge(&parts);
+    let Merged { header, parts } = merged.ok_or_else(|| Error::io(path, "deep images are not supported"))?;
+    let mut strings = HashMap::new();
+    for part in parts.iter().map(|&i| &found.headers[i]) {
+        let all = part.own_attributes.other.iter().chain(&part.shared_attributes.other);
+        for (name, value) in all {
+            if let AttributeValue::Text(text) = value {
+                strings.entry(name.to_string()).or_insert_with(|| text.to_string());
+            }
+        }
+        if let Some(primaries) = part.shared_attributes.chromaticities {
+            let points = [primaries.red, primaries.green, primaries.blue, primaries.white];
+            let numbers: Vec<_> = points.iter().flat_map(|point| [point.0.to_string(), point.1.to_string()]).collect();
+            strings.insert("chromaticities".into(), numbers.join(", "));
+        }
     }
-    let (size, origin) = (part.layer_size, part.own_attributes.layer_position);
-    let full = part.shared_attributes.display_window;
+    Ok((header, Box::new(Exr { strings, parts })))
+}
+
+fn part(found: &exr::meta::header::Header) -> Part {
+    let (size, origin) = (found.layer_size, found.own_attributes.layer_position);
+    let full = found.shared_attributes.display_window;
     let unsigned = |n: i32| usize::try_from(n).ok();
     let window = match [origin.0 - full.position.0, origin.1 - full.position.1].map(unsigned) {
         [Some(x), Some(y)] if (origin, size) != (full.position, full.size) => {
@@ -45,7 +66,7 @@ pub fn open(path: &Path) -> Result<(Header, Box<dyn Format>)> {
         _ => None,
     };
     let storage = |kind| if kind == SampleType::U32 { Storage::Unsigned(32) } else { Storage::Float };
-    let channels = &part.channels.list;
+    let channels = &found.channels.list;
     let header = Header {
         width: size.0,
         height: size.1,
@@ -54,34 +75,27 @@ pub fn open(path: &Path) -> Result<(Header, Box<dyn Format>)> {
         storage: channels.iter().map(|channel| storage(channel.sample_type)).collect(),
         window,
         format: "openexr".into(),
+        ..Header::default()
     };
-    let all = part.own_attributes.other.iter().chain(&part.shared_attributes.other);
-    let text = |(name, value): (&Text, &AttributeValue)| match value {
-        AttributeValue::Text(text) => Some((name.to_string(), text.to_string())),
-        _ => None,
-    };
-    let mut strings: HashMap<_, _> = all.filter_map(text).collect();
-    if let Some(primaries) = part.shared_attributes.chromaticities {
-        let points = [primaries.red, primaries.green, primaries.blue, primaries.white];
-        let numbers: Vec<_> = points.iter().flat_map(|point| [point.0.to_string(), point.1.to_string()]).collect();
-        strings.insert("chromaticities".into(), numbers.join(", "));
-    }
-    Ok((header, Box::new(Exr(strings))))
+    let name = found.own_attributes.layer_name.as_ref().map(ToString::to_string).unwrap_or_default();
+    Part { name, header, deep: found.deep }
 }
 
 impl Format for Exr {
     fn attribute(&self, name: &str) -> Option<String> {
-        self.0.get(name).cloned()
+        self.strings.get(name).cloned()
     }
 
     fn samples(&self, path: &Path) -> Result<Samples> {
-        let image =
-            read().no_deep_data().largest_resolution_level().all_channels().first_valid_layer().all_attributes();
+        let image = read().no_deep_data().largest_resolution_level().all_channels().all_layers().all_attributes();
         let image = image.from_file(path).map_err(|error| Error::io(path, error))?;
-        let channels = image.layer_data.channel_data.list;
-        let (count, pixels) = (channels.len(), image.layer_data.size.area());
+        // Deep parts are not among the layers of the image.
+        let wanted = image.layer_data.into_iter().enumerate().filter(|(i, _)| self.parts.contains(i));
+        let layers: Vec<_> = wanted.map(|(_, layer)| layer).collect();
+        let count: usize = layers.iter().map(|layer| layer.channel_data.list.len()).sum();
+        let pixels = layers.first().map_or(0, |layer| layer.size.area());
         let mut data = vec![0.0; count * pixels];
-        for (k, channel) in channels.into_iter().enumerate() {
+        for (k, channel) in layers.into_iter().flat_map(|layer| layer.channel_data.list).enumerate() {
             let slots = data.iter_mut().skip(k).step_by(count);
             match channel.sample_data {
                 FlatSamples::F16(values) => slots.zip(values).for_each(|(slot, value)| *slot = value.to_f32()),

@@ -114,8 +114,9 @@ impl Reconstruction for Blend {
             let share = 0.9 / self.methods.len() as f32;
             let report = |what: &str, done: f32| (context.progress)(what, (k as f32 + done) * share);
             let held = pixels * (NOTES + CANDIDATE * candidates.len() as u64);
-            let memory = context.memory.map(|memory| memory.saturating_sub(held));
-            let solution = method.reconstruct(frame, &Context { progress: &report, memory, notes: true })?;
+            let solution = context.beside(held, |memory| {
+                method.reconstruct(frame, &Context { progress: &report, memory, notes: true })
+            })?;
             best = candidates.len();
             let inner: Vec<Image> = notes.iter().filter_map(|name| solution.note(name).cloned()).collect();
             error = solution.error;

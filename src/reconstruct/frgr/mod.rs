@@ -28,7 +28,7 @@ use self::form::Form;
 use self::level::Level;
 use self::resample::Resampling;
 use super::features::{Feature, Kind};
-use super::inputs::{Inputs, too_little};
+use super::inputs::Inputs;
 use super::{Context, EdgeTrust, Method, Note, Parameter, Parameters, Reconstruction, Solution, Traits};
 use crate::error::{Error, Result};
 use crate::film::{EdgeNeed, Frame, Needs};
@@ -145,9 +145,10 @@ impl Reconstruction for Frgr {
         (context.progress)("denoise", 0.1);
         let report = |_: &str, share: f32| (context.progress)("denoise", 0.1 + 0.35 * share);
         let held = HELD_FLOATS * 4 * (inputs.width * inputs.height) as u64;
-        let memory = context.memory.map(|memory| memory.saturating_sub(held));
-        let context = Context { progress: &report, memory, notes: false };
-        let denoised = denoise(self.denoiser, (&level, self.form), (&inputs, frame), rows, &context)?;
+        let denoised = context.beside(held, |memory| {
+            let context = Context { progress: &report, memory, notes: false };
+            denoise(self.denoiser, (&level, self.form), (&inputs, frame), rows, &context)
+        })?;
         notes.add("denoised", &denoised.image, inputs.scale);
         let Denoised { image, error } = denoised;
         (context.progress)("pyramid", 0.45);
@@ -294,7 +295,7 @@ fn rows(inputs: &Inputs, memory: Option<u64>) -> Result<usize> {
     let row = 4 * BAND_FLOATS * width;
     let least = levels + row * LEAST_ROWS.min(height);
     if memory < least {
-        return Err(too_little("frgr", (inputs.width, inputs.height), least.div_ceil(1 << 20)));
+        return Err(Error::TooLittleMemory { method: METHOD.id, size: (inputs.width, inputs.height), bytes: least });
     }
     Ok(((memory - levels) / row).min(height) as usize)
 }

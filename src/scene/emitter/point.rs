@@ -17,8 +17,8 @@ fn make(object: &Object, loader: &mut Loader) -> Result<Box<dyn Emitter>> {
     if object.get("position").is_some() && object.get("to_world").is_some() {
         return Err(object.loc_of("position").invalid("give either `position` or `to_world`"));
     }
-    let origin = object.transform("to_world")?.transform_point3(Vec3::ZERO);
-    let position = object.vector("position", origin)?;
+    let origin = loader.to_world(object)?.transform_point3(Vec3::ZERO);
+    let position = loader.position(object, "position", origin)?;
     Ok(Box::new(Point { position, intensity: loader.uniform_radiance(object, "intensity")? }))
 }
 

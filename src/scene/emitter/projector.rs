@@ -25,7 +25,7 @@ fn make(object: &Object, loader: &mut Loader) -> Result<Box<dyn Emitter>> {
     let aspect = slide.resolution().map_or(1.0, |size| size.x / size.y);
     let half_width = sensor::half_width(object, aspect)?;
     Ok(Box::new(Projector {
-        apex: Apex::load(object)?,
+        apex: Apex::load(object, loader)?,
         slide,
         scale: object.float("scale", 1.0)?,
         half_extent: vec2(half_width, half_width / aspect),

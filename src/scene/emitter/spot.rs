@@ -26,7 +26,7 @@ fn make(object: &Object, loader: &mut Loader) -> Result<Box<dyn Emitter>> {
         return Err(object.loc_of("cutoff_angle").invalid(what));
     }
     Ok(Box::new(Spot {
-        apex: Apex::load(object)?,
+        apex: Apex::load(object, loader)?,
         intensity: loader.uniform_radiance(object, "intensity")?,
         slide: loader.texture(object, "texture", Rgb::ONE)?,
         cutoff: cutoff.to_radians(),

@@ -7,6 +7,7 @@ use std::sync::Arc;
 use super::props::Object;
 use super::{Loader, find};
 use crate::error::Result;
+use crate::math::{Vec2, Vec3};
 use crate::scene::emitter::{self, Emitter};
 use crate::scene::shape;
 use crate::scene::{Bounds, Group, Shape, bsdf};
@@ -25,6 +26,8 @@ pub struct Contents {
     pub emitters: Vec<Box<dyn Emitter>>,
     /// Their ids, or those of their shapes.
     pub emitter_names: Vec<Arc<str>>,
+    /// Their weights when one is chosen.
+    pub emitter_weights: Vec<f32>,
 }
 
 /// Shapes that are instanced together, with their bounding box.
@@ -53,11 +56,12 @@ impl Contents {
     pub fn emitter(&mut self, object: &Object, loader: &mut Loader) -> Result<()> {
         let plugin = find(emitter::PLUGINS, object)?;
         let emitter = (plugin.make)(object, loader)?;
-        // How often an emitter is sampled is decided from its power.
-        object.ignore(&["sampling_weight"]);
-        object.all_used(plugin.parameters)?;
+        let weight =
+            sampling_weight(object, loader, emitter.sample(Vec3::ONE, Vec2::ZERO).is_some_and(|point| point.delta))?;
+        loader.all_used(object, plugin.parameters)?;
         self.emitters.push(emitter);
         self.emitter_names.push(name(object));
+        self.emitter_weights.push(weight);
         Ok(())
     }
 
@@ -69,7 +73,7 @@ impl Contents {
             "shapegroup" => Ok(()),
             "merge" => loader.guarded(object, |loader| {
                 let children = children(object, loader)?;
-                object.all_used("nested shapes")?;
+                loader.all_used(object, "nested shapes")?;
                 children.iter().try_for_each(|child| self.shape(child, loader))
             }),
             _ if self.shapes.len() >= MAX_SHAPES => {
@@ -79,9 +83,10 @@ impl Contents {
                 let number = (self.shapes.len() as u32, self.emitters.len() as u32);
                 if let Some((shape, emitter)) = single(object, loader, number)? {
                     self.shapes.push(shape);
-                    if let Some((emitter, name)) = emitter {
+                    if let Some((emitter, name, weight)) = emitter {
                         self.emitters.push(emitter);
                         self.emitter_names.push(name);
+                        self.emitter_weights.push(weight);
                     }
                 }
                 Ok(())
@@ -90,7 +95,7 @@ impl Contents {
     }
 
     fn instance(&mut self, object: &Rc<Object>, loader: &mut Loader) -> Result<()> {
-        let to_world = object.transform("to_world")?;
+        let to_world = loader.to_world(object)?;
         let groups = children(object, loader)?;
         let [group] = groups.as_slice() else {
             return Err(object.loc.invalid("an instance needs exactly one shapegroup"));
@@ -98,7 +103,7 @@ impl Contents {
         if group.plugin != "shapegroup" {
             return Err(group.loc.invalid(format!("an instance of `{}`; it takes a shapegroup", group.plugin)));
         }
-        object.all_used("to_world, one shapegroup")?;
+        loader.all_used(object, "to_world, one shapegroup")?;
         let (bounds, group) = self.group(group, loader)?;
         if !bounds.transformed(to_world).is_finite() {
             return Err(object.loc.invalid("coordinates are not finite"));
@@ -118,14 +123,14 @@ impl Contents {
             if CONTAINERS.iter().any(|(name, _)| *name == child.plugin) {
                 return Err(child.loc.unsupported(format!("`{}` in a shapegroup", child.plugin)));
             }
-            if let Some((shape, emitter)) = single(&child, loader, (0, 0))? {
+            if let Some((shape, emitter)) = loader.in_group(|loader| single(&child, loader, (0, 0)))? {
                 if emitter.is_some() {
                     return Err(child.loc.unsupported("an emitter in a shapegroup"));
                 }
                 shapes.push(shape);
             }
         }
-        object.all_used("nested shapes")?;
+        loader.all_used(object, "nested shapes")?;
         let bounds = shapes.iter().fold(Bounds::EMPTY, |all, shape| all.union(shape.geometry.bounds()));
         let index = list.len();
         by_origin.insert(Rc::as_ptr(object), index);
@@ -148,8 +153,8 @@ fn children(object: &Object, loader: &Loader) -> Result<Vec<Rc<Object>>> {
     Ok(found)
 }
 
-/// A shape with its emitter, if it is emissive, and that emitter's name.
-type Lit = (Shape, Option<(Box<dyn Emitter>, Arc<str>)>);
+/// A shape with its emitter, if it is emissive, that emitter's name and weight.
+type Lit = (Shape, Option<(Box<dyn Emitter>, Arc<str>, f32)>);
 
 /// A shape with its emitter, which will have the numbers given; none when it has no area.
 fn single(object: &Object, loader: &mut Loader, (shape_number, emitter_number): (u32, u32)) -> Result<Option<Lit>> {
@@ -168,9 +173,9 @@ fn single(object: &Object, loader: &mut Loader, (shape_number, emitter_number): 
             }
             "emitter" if nested.plugin == "area" => {
                 // An id of its own goes before that of the shape.
-                radiance = Some((loader.radiance(&nested, "radiance")?, nested.id.clone()));
-                nested.ignore(&["sampling_weight"]);
-                nested.all_used("radiance")?;
+                let weight = sampling_weight(&nested, loader, false)?;
+                radiance = Some((loader.radiance(&nested, "radiance")?, nested.id.clone(), weight));
+                loader.all_used(&nested, "radiance")?;
             }
             other => {
                 let what = format!("{other} `{}` in a shape; it takes a bsdf and an area emitter", nested.plugin);
@@ -180,18 +185,31 @@ fn single(object: &Object, loader: &mut Loader, (shape_number, emitter_number): 
     }
     // How derivatives are estimated.
     object.ignore(&["silhouette_sampling_weight"]);
-    object.all_used(plugin.parameters)?;
+    loader.all_used(object, plugin.parameters)?;
     // A shape without area (degenerate triangles only) is invisible, and as an emitter it emits nothing.
     if geometry.area() <= 0.0 {
         return Ok(None);
     }
-    let emitter = radiance.map(|(radiance, id)| {
+    let emitter = radiance.map(|(radiance, id, weight)| {
         let area = emitter::Area::new(Arc::clone(&geometry), radiance, shape_number);
-        (Box::new(area) as Box<dyn Emitter>, id.map_or_else(|| name(object), |id| id.as_str().into()))
+        (Box::new(area) as Box<dyn Emitter>, id.map_or_else(|| name(object), |id| id.as_str().into()), weight)
     });
     let bsdf = bsdf.unwrap_or_else(|| bsdf::default(emitter.is_some()));
     let (name, number) = (name(object), emitter.as_ref().map(|_| emitter_number));
     Ok(Some((Shape { name, material, geometry, bsdf, emitter: number }, emitter)))
+}
+
+/// The factor of an emitter's chance to be sampled; `only_sampled`: no path meets it otherwise.
+fn sampling_weight(object: &Object, loader: &Loader, only_sampled: bool) -> Result<f32> {
+    let weight = object.float("sampling_weight", 1.0)?;
+    let loc = object.loc_of("sampling_weight");
+    if !(weight >= 0.0 && weight.is_finite()) {
+        return Err(loc.invalid(format!("a `sampling_weight` of {weight}; it cannot be negative")));
+    }
+    if weight == 0.0 && only_sampled {
+        loader.warn(&loc, format!("`{}` with a `sampling_weight` of 0 gives no light", object.plugin))?;
+    }
+    Ok(weight)
 }
 
 /// The id of an object, or its type and line in the file.

@@ -3,13 +3,15 @@
 use std::collections::HashMap;
 use std::rc::Rc;
 
+use glam::DMat4;
+
 use super::legacy::{self, Legacy};
 use super::props::{Object, Property, Value};
 use super::spectrum::Spectrum;
 use super::xml::{At, Parser};
 use super::{transform, values};
 use crate::error::{Error, Result, SourceLoc};
-use crate::math::{Mat4, Vec3};
+use crate::math::Vec3;
 
 impl Parser {
     /// An element as a property of the one that it is in.
@@ -80,7 +82,8 @@ impl Parser {
 
     fn object(&mut self, at: At) -> Result<Rc<Object>> {
         let mut plugin = match self.optional(at, "type")? {
-            Some(plugin) => plugin,
+            // Types are names of files, which have no capitals, and not every system tells these apart.
+            Some(plugin) => plugin.to_lowercase(),
             None => {
                 return Err(at
                     .loc()
@@ -106,7 +109,7 @@ impl Parser {
         let id = self.optional(at, "id")?;
         // Mitsuba's own files write textures either way.
         let class = if at.tag() == "spectrum" { "texture" } else { at.tag() }.to_owned();
-        let object = Rc::new(Object { class, plugin, id: id.clone(), loc: at.loc(), properties });
+        let object = Rc::new(Object { class, plugin, id: id.clone(), loc: at.loc(), legacy: self.legacy, properties });
         if let Some(id) = id {
             if self.values.contains_key(&id) || self.tree.ids.insert(id.clone(), Rc::clone(&object)).is_some() {
                 return Err(at.loc().invalid(format!("the id `{id}` is given twice")));
@@ -129,7 +132,7 @@ impl Parser {
         Ok(Vec3::from_array(result))
     }
 
-    fn transform(&mut self, at: At) -> Result<Mat4> {
+    fn transform(&mut self, at: At) -> Result<DMat4> {
         let mut steps = Vec::new();
         for child in at.children() {
             let loc = child.loc();

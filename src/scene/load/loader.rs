@@ -6,11 +6,14 @@ use std::path::{Path, PathBuf};
 use std::rc::Rc;
 use std::sync::Arc;
 
+use glam::{DMat4, DVec3};
+
 use super::mesh::{self, MeshData};
 use super::props::{Object, Property, Value};
 use super::{find, xml};
 use crate::error::{Error, Result, SourceLoc};
-use crate::math::Rgb;
+use crate::image::io::DataWindow;
+use crate::math::{Mat4, Rgb, Vec3};
 use crate::scene::bsdf::{self, Bsdf};
 use crate::scene::shape::Geometry;
 use crate::scene::texture::{self, Texture};
@@ -23,6 +26,8 @@ const MAX_COST: usize = 1000;
 /// Builds objects, each shared one once.
 pub struct Loader {
     tree: xml::Tree,
+    /// The file's position of the world's origin, or that of the group whose shapes are being built.
+    origin: DVec3,
     /// Objects that have been built, with the number of objects that each is made of.
     bsdfs: HashMap<*const Object, (Arc<dyn Bsdf>, usize)>,
     textures: HashMap<*const Object, (Arc<dyn Texture>, usize)>,
@@ -39,10 +44,12 @@ pub struct Loader {
 }
 
 impl Loader {
-    /// A loader of the objects of a file, with so many bytes of memory for textures.
-    pub fn new(tree: xml::Tree, texture_memory: u64) -> Self {
+    /// A loader of the objects of a file, with so many bytes of memory for textures. Positions are those of the file less
+    /// `origin`.
+    pub fn new(tree: xml::Tree, texture_memory: u64, origin: DVec3) -> Self {
         Self {
             tree,
+            origin,
             bsdfs: HashMap::new(),
             textures: HashMap::new(),
             bitmaps: HashMap::new(),
@@ -60,6 +67,27 @@ impl Loader {
         (self.attributes, self.files.into_inner().into_iter().collect(), self.tree.warnings.into_list())
     }
 
+    /// The property `to_world`: from the object's own coordinates to those of the world, or of the group that it is in.
+    pub fn to_world(&self, object: &Object) -> Result<Mat4> {
+        Ok((DMat4::from_translation(-self.origin) * object.exact_transform("to_world")?).as_mat4())
+    }
+
+    /// A position in the world.
+    pub fn position(&self, object: &Object, name: &str, default: Vec3) -> Result<Vec3> {
+        if object.get(name).is_none() {
+            return Ok(default);
+        }
+        Ok((object.vector(name, default)?.as_dvec3() - self.origin).as_vec3())
+    }
+
+    /// Builds the shapes of a group, whose coordinates are its own.
+    pub fn in_group<T>(&mut self, make: impl FnOnce(&mut Self) -> Result<T>) -> Result<T> {
+        let origin = std::mem::take(&mut self.origin);
+        let made = make(self);
+        self.origin = origin;
+        made
+    }
+
     /// Warns that something does not mean what it says; fails where warnings are errors.
     pub fn warn(&self, loc: &SourceLoc, what: impl Into<String>) -> Result<()> {
         self.tree.warnings.add(loc, what)
@@ -75,6 +103,27 @@ impl Loader {
             };
             self.warn(&property.loc, format!("{name} of {class} `{plugin}` has no meaning here and is ignored"))
         })
+    }
+
+    /// Fails on the first property that was never read; `supported` lists the known ones. In files of version 0.6 or before
+    /// plain values that nothing asks for are warnings, as for the programs that these were made for.
+    pub fn all_used(&self, object: &Object, supported: &str) -> Result<()> {
+        for property in object.unused() {
+            let (class, plugin) = (&object.class, &object.plugin);
+            let (what, is_value) = match &property.value {
+                Value::Object(nested) => {
+                    (format!("{class} `{plugin}` has no use for the {} here", nested.class), false)
+                }
+                Value::Reference(id) => (format!("{class} `{plugin}` has no use for `{id}` here"), false),
+                _ => (format!("{class} `{plugin}` has no property `{}`", property.name), true),
+            };
+            if object.legacy && is_value {
+                self.warn(&property.loc, format!("{what}: it is ignored; it takes: {supported}"))?;
+            } else {
+                return Err(property.loc.unsupported(format!("{what}; it takes: {supported}")));
+            }
+        }
+        Ok(())
     }
 
     /// The object a property holds or refers to.
@@ -123,7 +172,7 @@ impl Loader {
         // Reflectances above one are the file's to avoid.
         object.ignore(&["ensure_energy_conservation"]);
         let (made, cost) = self.counted(object, |loader| (plugin.make)(object, loader))?;
-        object.all_used(plugin.parameters)?;
+        self.all_used(object, plugin.parameters)?;
         self.bsdfs.insert(Rc::as_ptr(object), (Arc::clone(&made), cost));
         Ok(made)
     }
@@ -224,7 +273,7 @@ impl Loader {
         }
         let plugin = find(texture::PLUGINS, object)?;
         let (made, cost) = self.counted(object, |loader| (plugin.make)(object, loader))?;
-        object.all_used(plugin.parameters)?;
+        self.all_used(object, plugin.parameters)?;
         self.textures.insert(Rc::as_ptr(object), (Arc::clone(&made), cost));
         Ok(made)
     }
@@ -249,7 +298,16 @@ impl Loader {
         if let Some((_, texels)) = read.iter().find(|(known, _)| *known == selection) {
             return Ok(Arc::clone(texels));
         }
-        let (texels, infinite) = texture::Texels::read(&path, &selection, &mut self.texture_memory)?;
+        let (texels, odd) = texture::Texels::read(&path, &selection, &mut self.texture_memory)?;
+        if let Some(DataWindow { origin: (x, y), full: (width, height) }) = odd.window {
+            let (w, h) = (texels.width, texels.height);
+            let what = format!("the file has {w}x{h} pixels at {x},{y} of a picture of {width}x{height}");
+            self.warn(
+                &SourceLoc::file(&path),
+                format!("{what}: they are stretched over the whole texture, as by Mitsuba"),
+            )?;
+        }
+        let infinite = odd.infinite;
         if infinite > 0 {
             let what = format!("{infinite} texels are not finite: infinity counts as 65504, what is no number as zero");
             self.warn(&SourceLoc::file(&path), what)?;

@@ -13,11 +13,14 @@ pub mod props;
 pub mod spectrum;
 mod transform;
 pub mod values;
+mod view;
 mod warnings;
 mod xml;
 
 use std::path::Path;
 use std::rc::Rc;
+
+use glam::DVec3;
 
 pub use self::contents::CONTAINERS;
 use self::contents::Contents;
@@ -88,19 +91,36 @@ pub fn name(path: &Path) -> String {
 
 /// Loads a scene file with everything it refers to.
 pub fn load(path: &Path, options: &Options) -> Result<Scene> {
-    build(path, xml::parse(path, None, &options.parameters, options.strict)?, options)
+    load_tree(path, &|| xml::parse(path, None, &options.parameters, options.strict), options)
 }
 
 /// Loads a scene from the text of a scene file. Files that it names are looked for in the current folder.
 pub fn load_text(text: &str, options: &Options) -> Result<Scene> {
     let path = Path::new("scene.xml");
-    build(path, xml::parse(path, Some(text), &options.parameters, options.strict)?, options)
+    load_tree(path, &|| xml::parse(path, Some(text), &options.parameters, options.strict), options)
 }
 
-fn build(path: &Path, tree: xml::Tree, options: &Options) -> Result<Scene> {
+/// Loads what is parsed. A scene far from the origin is loaded once more with an origin near its camera: floats there are too
+/// coarse for it.
+fn load_tree(path: &Path, parse: &dyn Fn() -> Result<xml::Tree>, options: &Options) -> Result<Scene> {
+    let mut scene = build(path, parse()?, options, DVec3::ZERO)?;
+    if let Some(origin) = view::near_camera(&scene) {
+        scene = build(path, parse()?, options, origin)?;
+    }
+    if let Some(what) = view::clipped(&scene).filter(|_| !scene.sensors.is_empty()) {
+        let loc = SourceLoc::file(path);
+        if options.strict {
+            return Err(loc.unsupported(what));
+        }
+        scene.warnings.push(format!("{loc}: {what}"));
+    }
+    Ok(scene)
+}
+
+fn build(path: &Path, tree: xml::Tree, options: &Options, origin: DVec3) -> Result<Scene> {
     let fingerprint = fingerprint(&tree, options);
     let objects = tree.objects.clone();
-    let mut loader = Loader::new(tree, options.texture_memory);
+    let mut loader = Loader::new(tree, options.texture_memory, origin);
     let mut contents = Contents::default();
     let (mut sensors, mut integrators) = (Vec::new(), Vec::new());
     for object in &objects {
@@ -126,7 +146,7 @@ fn build(path: &Path, tree: xml::Tree, options: &Options) -> Result<Scene> {
         None => Sensor::default(),
     };
     let sensors = sensors.into_iter().map(|object| SensorInfo::new(object)).collect();
-    let Contents { shapes, groups, emitters, emitter_names } = contents;
+    let Contents { shapes, groups, emitters, emitter_names, emitter_weights } = contents;
     let chosen = integrator::choose(&integrators, &mut loader)?;
     let integrator = Integrator { max_depth: options.max_depth.unwrap_or(chosen.max_depth), ..chosen };
     let groups = groups.into_values();
@@ -138,9 +158,11 @@ fn build(path: &Path, tree: xml::Tree, options: &Options) -> Result<Scene> {
         groups,
         emitters,
         emitter_names,
+        emitter_weights,
         sensor,
         sensors,
         integrator,
+        origin,
         fingerprint,
         files,
         warnings,

@@ -3,6 +3,8 @@
 use std::cell::Cell;
 use std::rc::Rc;
 
+use glam::DMat4;
+
 use super::spectrum::Spectrum;
 use crate::error::{Error, Result, SourceLoc};
 use crate::math::{Mat4, Rgb, Vec3};
@@ -25,7 +27,7 @@ pub enum Value {
     /// `<spectrum>`.
     Spectrum(Spectrum),
     /// `<transform>`.
-    Transform(Mat4),
+    Transform(DMat4),
     /// `<ref>` to an object by its id.
     Reference(String),
     /// A nested element with a `type`.
@@ -71,6 +73,8 @@ pub struct Object {
     pub id: Option<String>,
     /// Location in the file.
     pub loc: SourceLoc,
+    /// Whether the file is of version 0.6 or before.
+    pub legacy: bool,
     /// Everything in it, in order.
     pub properties: Vec<Property>,
 }
@@ -169,12 +173,18 @@ impl Object {
         }
     }
 
-    /// A transform, which must be invertible.
+    /// A transform of directions or of texture coordinates, which must be invertible. [`super::Loader::to_world`] has those
+    /// of positions in the world.
     pub fn transform(&self, name: &str) -> Result<Mat4> {
+        Ok(self.exact_transform(name)?.as_mat4())
+    }
+
+    /// The same in double precision.
+    pub fn exact_transform(&self, name: &str) -> Result<DMat4> {
         match self.get(name) {
-            None => Ok(Mat4::IDENTITY),
+            None => Ok(DMat4::IDENTITY),
             Some(Property { value: Value::Transform(matrix), loc, .. }) => {
-                let determinant = matrix.as_dmat4().determinant();
+                let determinant = matrix.as_mat4().as_dmat4().determinant();
                 if determinant == 0.0 || !determinant.is_finite() {
                     return Err(loc.invalid(format!("the transform `{name}` cannot be inverted")));
                 }
@@ -204,20 +214,5 @@ impl Object {
     /// Properties that were never read.
     pub fn unused(&self) -> impl Iterator<Item = &Property> {
         self.properties.iter().filter(|property| !property.used.get())
-    }
-
-    /// Fails on the first property that was never read; `supported` lists the known ones.
-    pub fn all_used(&self, supported: &str) -> Result<()> {
-        match self.unused().next() {
-            None => Ok(()),
-            Some(property) => {
-                let (class, plugin) = (&self.class, &self.plugin);
-                let what = match &property.value {
-                    Value::Object(object) => format!("{class} `{plugin}` has no use for the {} here", object.class),
-                    _ => format!("{class} `{plugin}` has no property `{}`", property.name),
-                };
-                Err(property.loc.unsupported(format!("{what}; it takes: {supported}")))
-            }
-        }
     }
 }

@@ -1,6 +1,6 @@
 //! The elements of `<transform>`, composed in double precision.
 
-use glam::{DMat4, DVec3, DVec4, Mat4};
+use glam::{DMat4, DVec3, DVec4};
 
 use crate::error::{Result, SourceLoc};
 use crate::math::Vec3;
@@ -51,8 +51,8 @@ pub fn matrix(numbers: &[f64], loc: &SourceLoc) -> Result<DMat4> {
 }
 
 /// The steps applied one after the other, the first one first.
-pub fn chain(steps: &[DMat4]) -> Mat4 {
-    steps.iter().fold(DMat4::IDENTITY, |whole, step| *step * whole).as_mat4()
+pub fn chain(steps: &[DMat4]) -> DMat4 {
+    steps.iter().fold(DMat4::IDENTITY, |whole, step| *step * whole)
 }
 
 #[cfg(test)]
@@ -64,17 +64,17 @@ mod tests {
 
     #[test]
     fn steps_apply_in_reading_order() {
-        let chained = chain(&[translate(Vec3::X), scale(Vec3::splat(2.0))]);
+        let chained = chain(&[translate(Vec3::X), scale(Vec3::splat(2.0))]).as_mat4();
         assert_eq!(chained.transform_point3(Vec3::ZERO), vec3(2.0, 0.0, 0.0));
         let loc = SourceLoc::file(Path::new("t"));
-        let turned = chain(&[rotate(Vec3::Z, 90.0, &loc).unwrap()]).transform_point3(Vec3::X);
+        let turned = chain(&[rotate(Vec3::Z, 90.0, &loc).unwrap()]).as_mat4().transform_point3(Vec3::X);
         assert!(turned.distance(Vec3::Y) < 1e-6);
     }
 
     #[test]
     fn look_at_has_x_to_the_left() {
         let loc = SourceLoc::file(Path::new("t"));
-        let frame = chain(&[look_at(Vec3::ZERO, Vec3::NEG_Z, Vec3::Y, &loc).unwrap()]);
+        let frame = chain(&[look_at(Vec3::ZERO, Vec3::NEG_Z, Vec3::Y, &loc).unwrap()]).as_mat4();
         assert!(frame.transform_vector3(Vec3::Z).distance(Vec3::NEG_Z) < 1e-6);
         assert!(frame.transform_vector3(Vec3::X).distance(Vec3::NEG_X) < 1e-6);
         assert!(look_at(Vec3::ZERO, Vec3::Y, Vec3::Y, &loc).is_err());

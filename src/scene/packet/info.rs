@@ -92,8 +92,13 @@ impl UniformMeshLight {
             let Corners { p: [a, b, c], n } = *mesh.corners(index);
             let flat = (b - a).cross(c - a).normalize_or(Vec3::Z) * mesh.side();
             let sides = n.map(|n| flat.dot(n * mesh.side()));
-            let agree = sides.iter().all(|&side| side >= 0.0) || sides.iter().all(|&side| side < 0.0);
-            agree.then(|| LightTriangle { corner: a, sides: [b - a, c - a], n: flat * 1f32.copysign(sides[0]) })
+            // Without normals of its own the sides are zero, of any sign.
+            let (front, back) = (sides.iter().all(|&side| side >= 0.0), sides.iter().all(|&side| side < 0.0));
+            (front || back).then(|| LightTriangle {
+                corner: a,
+                sides: [b - a, c - a],
+                n: if back { -flat } else { flat },
+            })
         };
         let triangles = (0..mesh.triangles.len() as u32).map(light_triangle).collect::<Option<_>>()?;
         Some(Self { radiance, area: mesh.area(), areas: mesh.areas()?.clone(), triangles })

@@ -77,6 +77,8 @@ pub struct Surfaces {
     pub wi: Lanes3,
     /// Distances of ray origins from the surfaces.
     pub epsilon: Lanes,
+    /// Radii of exactly curved surfaces, as [`Surface`] has them.
+    curvature: Lanes,
     /// Indices of the shapes.
     pub shape: Bits,
     /// Lanes whose surface is emissive; valid where a ray has hit something.
@@ -97,6 +99,7 @@ impl Default for Surfaces {
             frame: Frames { s: zero, t: zero, n: zero },
             wi: zero,
             epsilon: Lanes::ZERO,
+            curvature: Lanes::ZERO,
             shape: Bits::ZERO,
             emissive: Mask::NONE,
             uv: [Lanes::ZERO; 2],
@@ -120,6 +123,7 @@ impl Surfaces {
             dp_du: self.dp_du.get(lane),
             dp_dv: self.dp_dv.get(lane),
             epsilon: self.epsilon.0[lane],
+            curvature: self.curvature.0[lane],
             wi: self.wi.get(lane),
         }
     }
@@ -144,6 +148,7 @@ impl Surfaces {
         self.frame.n.set(lane, surface.frame.n);
         self.wi.set(lane, surface.wi);
         self.epsilon.0[lane] = surface.epsilon;
+        self.curvature.0[lane] = surface.curvature;
         self.shape.0[lane] = surface.at.shape;
         (self.uv[0].0[lane], self.uv[1].0[lane]) = surface.at.uv.into();
         (self.barycentric[0].0[lane], self.barycentric[1].0[lane]) = surface.at.barycentric.into();
@@ -165,6 +170,7 @@ impl Surfaces {
         copy3(&mut self.dp_du, &from.dp_du);
         copy3(&mut self.dp_dv, &from.dp_dv);
         self.epsilon.0[to] = from.epsilon.0[lane];
+        self.curvature.0[to] = from.curvature.0[lane];
         self.shape.0[to] = from.shape.0[lane];
         self.primitive.0[to] = from.primitive.0[lane];
         for k in 0..2 {
@@ -173,10 +179,18 @@ impl Surfaces {
         }
     }
 
-    /// Origins of rays that leave along `direction`.
+    /// [`Surface::leave`].
     #[inline(always)]
     pub fn leave(&self, direction: Lanes3) -> Lanes3 {
-        offset(self.p, self.n, self.epsilon, direction)
+        let cosine = self.n.dot(direction);
+        let off = offset(self.p, self.n, self.epsilon, direction);
+        let inside = (cosine * self.curvature).less(Lanes::ZERO);
+        if !inside.any() {
+            return off;
+        }
+        let room = cosine * cosine * self.curvature.abs();
+        let along = inside & room.greater(Lanes::splat(2.0) * self.epsilon * direction.dot(direction));
+        along.select3(self.p + direction * (self.epsilon / cosine.abs()), off)
     }
 }
 
@@ -308,6 +322,7 @@ vectorized! {
         surfaces.frame = frame;
         surfaces.wi = frame.to_local(-rays.direction);
         surfaces.epsilon = epsilon(surfaces.p, scene_size);
+        surfaces.curvature = Lanes::ZERO;
         surfaces.shape = Bits(hits.geometry);
         surfaces.barycentric = [u, v];
         surfaces.primitive = Bits(hits.primitive);

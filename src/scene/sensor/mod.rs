@@ -138,7 +138,7 @@ pub fn load(object: &Object, loader: &Loader, size: Option<(usize, usize)>, crop
         height,
         spp,
         film,
-        to_world: object.transform("to_world")?,
+        to_world: loader.to_world(object)?,
         half_extent: vec2(half_width, half_width / aspect),
         principal_point: vec2(
             object.float("principal_point_offset_x", 0.0)?,
@@ -150,7 +150,7 @@ pub fn load(object: &Object, loader: &Loader, size: Option<(usize, usize)>, crop
     };
     // Files name shutter times and the focus of pinholes; neither has a meaning here.
     object.ignore(&["focus_distance", "shutter_open", "shutter_close"]);
-    object.all_used(parameters)?;
+    loader.all_used(object, parameters)?;
     Ok(sensor)
 }
 
@@ -224,6 +224,26 @@ impl Sensor {
     /// [`Sensor::ray`] for sixteen film positions.
     pub fn rays(&self, film: [Lanes; 2], lens: [Lanes; 2]) -> Rays {
         view(self, film, lens)
+    }
+
+    /// Rays all over the whole film, the middle one first, whatever its size and the part of it that is rendered.
+    pub fn overview(&self) -> Vec<Ray> {
+        const SIDE: usize = 7;
+        let whole = Self { width: SIDE, height: SIDE, film: FilmWindow::default(), ..self.clone() };
+        let middles = (0..SIDE * SIDE).map(|i| vec2((i % SIDE) as f32 + 0.5, (i / SIDE) as f32 + 0.5));
+        let mut rays: Vec<Ray> = middles.map(|at| whole.ray(at, Vec2::splat(0.5))).collect();
+        rays.swap(0, SIDE * SIDE / 2);
+        rays
+    }
+
+    /// The same camera without clip planes.
+    pub fn unclipped(&self) -> Self {
+        Self { near: 0.0, far: f32::INFINITY, ..self.clone() }
+    }
+
+    /// Depths of the clip planes, near and far.
+    pub fn clip_planes(&self) -> (f32, f32) {
+        (self.near, self.far)
     }
 
     /// Whether the file asks for an alpha channel.

@@ -21,7 +21,7 @@ const FACES: [[Vec3; 3]; 6] = [
 ];
 
 fn make(object: &Object, loader: &mut Loader) -> Result<Geometry> {
-    let to_world = object.transform("to_world")?;
+    let to_world = loader.to_world(object)?;
     let flip_normals = object.boolean("flip_normals", false)?;
     let mut data = MeshData::default();
     for [normal, second, fourth] in FACES {

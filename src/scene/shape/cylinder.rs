@@ -26,14 +26,14 @@ fn make(object: &Object, loader: &mut Loader) -> Result<Geometry> {
     }
     let Frame { s, t, .. } = Frame::around(axis.normalize());
     let placed = Mat4::from_cols((s * radius).extend(0.0), (t * radius).extend(0.0), axis.extend(0.0), p0.extend(1.0));
-    let to_world = object.transform("to_world")? * placed;
+    let to_world = loader.to_world(object)? * placed;
     let [x, y] = [Vec3::X, Vec3::Y].map(|axis| to_world.transform_vector3(axis).length());
     if (x - y).abs() > 1e-3 * x || tessellation::is_sheared(to_world) {
         loader.warn(&object.loc_of("to_world"), "a cylinder scaled unevenly is traced as a mesh of triangles")?;
         let placement = Placement { to_world, face_normals: false, flip_normals: side < 0.0 };
         return loader.finite(object, Geometry::Mesh(Mesh::new(tessellation::cylinder(), placement)));
     }
-    loader.finite(object, Geometry::Cylinder(Cylinder { to_world, to_object: to_world.inverse(), side }))
+    loader.finite(object, Geometry::Cylinder(Cylinder { to_world, to_object: to_world.inverse(), radius: x, side }))
 }
 
 /// One cylinder in world space.
@@ -41,6 +41,7 @@ pub struct Cylinder {
     /// From the unit cylinder about z in [0, 1].
     to_world: Mat4,
     to_object: Mat4,
+    radius: f32,
     /// -1 when the inside is the outside.
     side: f32,
 }
@@ -74,6 +75,7 @@ impl Cylinder {
             dp_du,
             dp_dv,
             epsilon: 0.0,
+            curvature: self.radius * self.side,
             wi: frame.to_local(-ray.direction),
         }
     }

@@ -15,7 +15,7 @@ use crate::scene::{Ray, Surface, texture};
 pub const PLUGIN: Plugin<Geometry> = Plugin { name: "disk", parameters: "to_world, flip_normals = false", make };
 
 fn make(object: &Object, loader: &mut Loader) -> Result<Geometry> {
-    let to_world = object.transform("to_world")?;
+    let to_world = loader.to_world(object)?;
     let side = if object.boolean("flip_normals", false)? { -1.0 } else { 1.0 };
     loader.finite(object, Geometry::Disk(Disk { to_world, to_object: to_world.inverse(), side }))
 }
@@ -55,6 +55,7 @@ impl Disk {
             dp_du,
             dp_dv,
             epsilon: 0.0,
+            curvature: 0.0,
             wi: frame.to_local(-ray.direction),
         }
     }

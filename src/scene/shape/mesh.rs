@@ -156,6 +156,7 @@ impl Mesh {
             dp_du,
             dp_dv,
             epsilon: 0.0,
+            curvature: 0.0,
             wi: frame.to_local(-ray.direction),
         }
     }

@@ -11,7 +11,7 @@ use crate::scene::load::{Loader, MeshData, Plugin};
 pub const PLUGIN: Plugin<Geometry> = Plugin { name: "rectangle", parameters: "to_world, flip_normals = false", make };
 
 fn make(object: &Object, loader: &mut Loader) -> Result<Geometry> {
-    let to_world = object.transform("to_world")?;
+    let to_world = loader.to_world(object)?;
     let flip_normals = object.boolean("flip_normals", false)?;
     let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
     let data = MeshData {

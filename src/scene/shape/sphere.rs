@@ -19,7 +19,7 @@ pub const PLUGIN: Plugin<Geometry> =
 fn make(object: &Object, loader: &mut Loader) -> Result<Geometry> {
     let center = object.vector("center", Vec3::ZERO)?;
     let radius = object.float("radius", 1.0)?;
-    let to_world = object.transform("to_world")?;
+    let to_world = loader.to_world(object)?;
     let flip = object.boolean("flip_normals", false)?;
     let axes = [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| to_world.transform_vector3(axis).length());
     if radius <= 0.0 || !radius.is_finite() {
@@ -78,6 +78,7 @@ impl Sphere {
             dp_du,
             dp_dv,
             epsilon: 0.0,
+            curvature: self.radius * self.side,
             wi: frame.to_local(-ray.direction),
         }
     }

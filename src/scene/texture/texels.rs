@@ -6,7 +6,7 @@ use std::sync::{Arc, OnceLock};
 
 use crate::error::Result;
 use crate::image::channels::{ColorChannels, Decoding, Integers};
-use crate::image::io::{CachedTexture, ImageFile, OpenImage, TextureSystem};
+use crate::image::io::{CachedTexture, DataWindow, ImageFile, OpenImage, TextureSystem};
 use crate::math::{Rgb, half, srgb_decode, vec3};
 
 /// Part of an image file that is read.
@@ -66,10 +66,18 @@ impl Memory {
     }
 }
 
+/// Properties of a file that textures do not show as they are.
+pub struct Oddities {
+    /// Number of texels that are not finite: infinity counts as the largest half float, and NaN as zero. Those of files beyond
+    /// the memory bound are not counted.
+    pub infinite: usize,
+    /// The larger picture of which the pixels of the file are a part. The texture consists of that part alone.
+    pub window: Option<DataWindow>,
+}
+
 impl Texels {
-    /// Reads an image file, or only its header when there is no room for the rest. Also gives the number of texels that
-    /// are not finite in the file: infinity counts as the largest half float, and what is no number as zero.
-    pub fn read(path: &Path, selection: &Selection, memory: &mut Memory) -> Result<(Self, usize)> {
+    /// Reads an image file, or only its header when there is no room for the rest.
+    pub fn read(path: &Path, selection: &Selection, memory: &mut Memory) -> Result<(Self, Oddities)> {
         let file = ImageFile::open(path)?;
         let colors = match &selection.channel {
             Some(channel) => ColorChannels::single(&file, path, channel, selection.integers)?,
@@ -78,11 +86,11 @@ impl Texels {
         let (width, height, order) = (file.width, file.height, colors.order);
         let eight_bit = colors.is_eight_bit(&file);
         let size = (width * height * if eight_bit { 3 } else { 12 }) as u64;
-        if size > memory.left && order.iter().all(|&channel| channel < MAX_CHANNELS) {
+        if size > memory.left && file.can_be_cached() && order.iter().all(|&channel| channel < MAX_CHANNELS) {
             if let Some(system) = memory.system() {
                 let texture = CachedTexture::open(&system, path)?;
                 let samples = Samples::Cached { texture, origin: file.origin, colors };
-                return Ok((Self { width, height, samples }, 0));
+                return Ok((Self { width, height, samples }, Oddities { infinite: 0, window: file.window }));
             }
         }
         memory.left = memory.left.saturating_sub(size);
@@ -99,7 +107,7 @@ impl Texels {
             };
             compact(file.floats()?.chunks_exact(count).map(texel).collect())
         };
-        Ok((Self { width, height, samples }, infinite.into_inner()))
+        Ok((Self { width, height, samples }, Oddities { infinite: infinite.into_inner(), window: file.window }))
     }
 
     /// Texels that are already linear colours.

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use ply_rs_bw::parser::{ParseError, Parser, Reader};
-use ply_rs_bw::ply::{ElementDef, Property, PropertyAccess, PropertyAccessResult, PropertyType};
+use ply_rs_bw::ply::{ElementDef, Encoding, Header, Property, PropertyAccess, PropertyAccessResult, PropertyType};
 
 use super::MeshData;
 use super::polygon::Triangulation;
@@ -138,6 +138,8 @@ pub fn read(bytes: &[u8], path: &Path) -> Result<MeshData> {
     let mut reader = Reader::new(bytes);
     let damaged = |error: ParseError| loc.invalid(format!("not a readable PLY file: {error}"));
     let header = Parser::<Vertex>::new().read_header(&mut reader).map_err(damaged)?;
+    let lines = if header.encoding == Encoding::Ascii { by_lines(bytes, &header, &loc)? } else { Vec::new() };
+    let mut reader = if header.encoding == Encoding::Ascii { Reader::new(lines.as_slice()) } else { reader };
     let (mut mesh, mut faces) = (MeshData::default(), None);
     for (name, element) in &header.elements {
         // Every entry takes at least one byte: a larger count is a damaged header.
@@ -159,6 +161,33 @@ pub fn read(bytes: &[u8], path: &Path) -> Result<MeshData> {
         add_faces(&mut mesh, &faces, element, &loc)?;
     }
     Ok(mesh)
+}
+
+/// The entries of an ASCII file, each on a line of its own: they are words between white space, however that is made up.
+fn by_lines(bytes: &[u8], header: &Header, loc: &SourceLoc) -> Result<Vec<u8>> {
+    const END: &[u8] = b"end_header";
+    let start = bytes.windows(END.len()).position(|window| window == END).map_or(bytes.len(), |at| at + END.len());
+    let mut words = bytes[start..].split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
+    let mut lines = Vec::with_capacity(bytes.len());
+    for (name, element) in &header.elements {
+        for entry in 0..element.count {
+            let ends = || loc.invalid(format!("the file ends in entry {entry} of {} of `{name}`", element.count));
+            for property in element.properties.values() {
+                let mut copy =
+                    || words.next().inspect(|word| lines.extend([word, &b" "[..]].concat())).ok_or_else(ends);
+                let word = copy()?;
+                if let PropertyType::List(..) = property.data_type {
+                    let count = std::str::from_utf8(word).ok().and_then(|text| text.parse::<usize>().ok());
+                    let what = || format!("entry {entry} of `{name}` has `{}` values", String::from_utf8_lossy(word));
+                    for _ in 0..count.ok_or_else(|| loc.invalid(what()))? {
+                        copy()?;
+                    }
+                }
+            }
+            lines.push(b'\n');
+        }
+    }
+    Ok(lines)
 }
 
 fn add_vertices(mesh: &mut MeshData, vertices: Vec<Vertex>, element: &ElementDef) {
