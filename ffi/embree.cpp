@@ -133,6 +133,22 @@ RTCRay to_rtc(const FluxionRay *ray) {
   return r;
 }
 
+/* Rejects hits from inside of a curve and on its caps, where `u` is that of an end. */
+void curve_filter(const RTCFilterFunctionNArguments *args) {
+  const uint8_t *ends = static_cast<const uint8_t *>(args->geometryUserPtr);
+  const unsigned n = args->N;
+  for (unsigned i = 0; i < n; ++i) {
+    if (!args->valid[i]) continue;
+    const float leaving = RTCRayN_dir_x(args->ray, n, i) * RTCHitN_Ng_x(args->hit, n, i) +
+                          RTCRayN_dir_y(args->ray, n, i) * RTCHitN_Ng_y(args->hit, n, i) +
+                          RTCRayN_dir_z(args->ray, n, i) * RTCHitN_Ng_z(args->hit, n, i);
+    const float u = RTCHitN_u(args->hit, n, i);
+    const uint8_t end = ends[RTCHitN_primID(args->hit, n, i)];
+    const bool cap = (u <= 0.0f && (end & 1)) || (u >= 1.0f && (end & 2));
+    if (leaving >= 0.0f || cap) args->valid[i] = 0;
+  }
+}
+
 /* Embree's packets of N rays. */
 template <int N> struct Packet;
 
@@ -282,6 +298,28 @@ uint32_t fluxion_scene_add_quadric(void *device, void *scene, const FluxionQuadr
   rtcSetGeometryBoundsFunction(geometry, quadric_bounds, nullptr);
   rtcSetGeometryIntersectFunction(geometry, quadric_intersect);
   rtcSetGeometryOccludedFunction(geometry, quadric_occluded);
+  return attach(scene, geometry);
+}
+
+uint32_t fluxion_scene_add_curves(void *device, void *scene, FluxionCurveKind kind, const float *points,
+                                  size_t point_count, const uint32_t *starts, const uint8_t *ends,
+                                  size_t segment_count) {
+  const RTCGeometryType type =
+      kind == FLUXION_BSPLINE ? RTC_GEOMETRY_TYPE_ROUND_BSPLINE_CURVE : RTC_GEOMETRY_TYPE_ROUND_LINEAR_CURVE;
+  RTCGeometry geometry = rtcNewGeometry(device_of(device), type);
+  rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT4, points, 0, 16, point_count);
+  rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT, starts, 0, 4, segment_count);
+  if (kind == FLUXION_LINEAR) {
+    uint8_t *flags = static_cast<uint8_t *>(
+        rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_FLAGS, 0, RTC_FORMAT_UCHAR, 1, segment_count));
+    for (size_t i = 0; flags && i < segment_count; ++i) {
+      flags[i] = static_cast<uint8_t>((ends[i] & 1 ? 0 : RTC_CURVE_FLAG_NEIGHBOR_LEFT) |
+                                      (ends[i] & 2 ? 0 : RTC_CURVE_FLAG_NEIGHBOR_RIGHT));
+    }
+  }
+  rtcSetGeometryUserData(geometry, const_cast<uint8_t *>(ends));
+  rtcSetGeometryIntersectFilterFunction(geometry, curve_filter);
+  rtcSetGeometryOccludedFilterFunction(geometry, curve_filter);
   return attach(scene, geometry);
 }
 

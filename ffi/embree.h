@@ -67,6 +67,8 @@ typedef struct FluxionQuadric {
   float upper[3];
 } FluxionQuadric;
 
+typedef enum FluxionCurveKind { FLUXION_BSPLINE, FLUXION_LINEAR } FluxionCurveKind;
+
 typedef void (*FluxionErrorFunction)(void *user, int code, const char *message);
 
 void *fluxion_device_new(const char *config, FluxionErrorFunction function, void *user);
@@ -82,6 +84,12 @@ uint32_t fluxion_scene_add_triangles(void *device, void *scene, const float *ver
 uint32_t fluxion_scene_add_spheres(void *device, void *scene, const float *spheres, size_t count);
 /* The quadric must outlive the scene. */
 uint32_t fluxion_scene_add_quadric(void *device, void *scene, const FluxionQuadric *quadric);
+/* `points` holds count * 4 floats: position and radius; `starts` the first point of every segment, which takes four of a B-spline
+ * and two of a straight piece. `ends` has bit 1 for the first segment of a curve and bit 2 for the last; it must outlive the scene,
+ * as the others. Only the outside is there, and no caps. */
+uint32_t fluxion_scene_add_curves(void *device, void *scene, FluxionCurveKind kind, const float *points,
+                                  size_t point_count, const uint32_t *starts, const uint8_t *ends,
+                                  size_t segment_count);
 /* Another, committed scene of the same device, placed by 16 floats column by column. */
 uint32_t fluxion_scene_add_instance(void *device, void *scene, void *child, const float to_world[16]);
 void fluxion_scene_commit(void *scene);

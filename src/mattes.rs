@@ -1,4 +1,4 @@
-//! Cryptomatte (Friedman and Jones 2015): shares of pixels by named objects and materials, from which compositors pick mattes, and plain
+//! Cryptomatte (Friedman and Jones 2015): shares of pixels by named objects, materials and instances, from which compositors pick mattes, and plain
 //! numbers of what a pixel shows most of.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -7,9 +7,10 @@ use std::path::Path;
 use std::sync::Arc;
 
 use crate::error::Result;
-use crate::image::io::{DataWindow, Kind, Pixels, write};
-use crate::render::shown_shapes;
-use crate::scene::{Scene, Shape};
+use crate::image::io::{Kind, Pixels, write};
+use crate::render::{Shown, ShownShapes, shown_shapes};
+use crate::scene::Scene;
+use crate::scene::sensor::{Crop, Sensor};
 
 /// Names that a pixel can have, in layers of two.
 const RANKS: usize = 6;
@@ -36,23 +37,34 @@ pub struct Id {
     pub number: u32,
 }
 
-/// Names that shapes have of one kind.
-type Naming = (&'static str, fn(&Shape) -> &Arc<str>);
+/// A kind of names, and the name of a shape, that of an instance where it is in one.
+type Naming = (&'static str, for<'a> fn(&'a Scene, Shown) -> &'a Arc<str>);
 
-/// The two kinds of names.
-const NAMINGS: [Naming; 2] = [("CryptoObject", |shape| &shape.name), ("CryptoMaterial", |shape| &shape.material)];
+/// All kinds of names. The last is for scenes with instances: what is in none has its own name there.
+const NAMINGS: [Naming; 3] = [
+    ("CryptoObject", |scene, shown| &scene.shapes()[shown.shape as usize].name),
+    ("CryptoMaterial", |scene, shown| &scene.shapes()[shown.shape as usize].material),
+    ("CryptoInstance", |scene, shown| {
+        let instance = scene.instance_names().get(shown.instance as usize);
+        instance.unwrap_or(&scene.shapes()[shown.shape as usize].name)
+    }),
+];
 
-/// Shares by objects and by materials, from the camera rays of `spp` samples of a seed.
-pub fn mattes(scene: &Scene, seed: u64, spp: u32) -> [Matte; 2] {
+/// Shares by objects, by materials and, where there are any, by instances, from the camera rays of `spp` samples of a seed.
+pub fn mattes(scene: &Scene, seed: u64, spp: u32) -> Vec<Matte> {
     let shown = shown_shapes(scene, seed, spp);
-    NAMINGS.map(|(name, of)| {
-        let names: BTreeSet<_> = scene.shapes().iter().map(of).collect();
+    let kinds = if scene.instance_names().is_empty() { 2 } else { 3 };
+    let of_kind = |&(name, of): &Naming| {
+        let shapes = (0..scene.shapes().len() as u32).map(|shape| Shown { shape, instance: u32::MAX });
+        // Shapes of groups are seen in instances only.
+        let instances = (0..scene.instance_names().len() as u32).map(|instance| Shown { shape: 0, instance });
+        let names: BTreeSet<_> = shapes.chain(instances).map(|shown| of(scene, shown)).collect();
         let id = |(number, name): (u32, &&Arc<str>)| (Arc::clone(name), Id { hashed: hashed(name), number });
         let ids = (1..).zip(&names).map(id).collect();
-        let pixel = |shapes: &Vec<(u32, u32)>| {
+        let pixel = |shapes: &ShownShapes| {
             let mut counts = BTreeMap::new();
-            for &(shape, count) in shapes {
-                *counts.entry(Arc::clone(of(&scene.shapes()[shape as usize]))).or_insert(0) += count;
+            for &(shown, count) in shapes {
+                *counts.entry(Arc::clone(of(scene, shown))).or_insert(0) += count;
             }
             let mut shares: Vec<_> =
                 counts.into_iter().map(|(name, count)| (name, count as f32 / spp as f32)).collect();
@@ -61,7 +73,8 @@ pub fn mattes(scene: &Scene, seed: u64, spp: u32) -> [Matte; 2] {
             shares
         };
         Matte { name, ids, pixels: shown.iter().map(pixel).collect() }
-    })
+    };
+    NAMINGS[..kinds].iter().map(of_kind).collect()
 }
 
 /// The identifier of a name: its hash as a float, made neither infinite nor denormal nor not a number.
@@ -90,7 +103,7 @@ impl Matte {
         (0..RANKS / 2).flat_map(of_layer).chain([self.number_channel()]).collect()
     }
 
-    /// The channel of numbers: `object.id` or `material.id`.
+    /// The channel of numbers: `object.id`, `material.id` or `instance.id`.
     fn number_channel(&self) -> String {
         format!("{}.id", self.name.trim_start_matches("Crypto").to_lowercase())
     }
@@ -116,18 +129,15 @@ impl Matte {
     }
 }
 
-/// Writes mattes as an EXR file, with more attributes.
-pub fn save(
-    path: &Path,
-    (width, height): (usize, usize),
-    mattes: &[Matte],
-    window: Option<DataWindow>,
-    mut attributes: Vec<(String, String)>,
-) -> Result<()> {
-    let mut data = Vec::new();
-    for pixel in 0..width * height {
+/// Writes the mattes of a sensor's picture as an EXR file, with more attributes.
+pub fn save(path: &Path, sensor: &Sensor, mattes: &[Matte], mut attributes: Vec<(String, String)>) -> Result<()> {
+    let whole = Crop { x: 0, y: 0, width: sensor.width, height: sensor.height };
+    let (inner, mut data) = (sensor.inner().unwrap_or(whole), Vec::new());
+    for pixel in inner.pixels().map(|(x, y)| y * sensor.width + x) {
         mattes.iter().for_each(|matte| matte.put(pixel, &mut data));
     }
+    let within = sensor.inner().map(|inner| inner.within(sensor.window(), (sensor.width, sensor.height)));
+    let (width, height, window) = (inner.width, inner.height, within.or(sensor.window()));
     attributes.extend(mattes.iter().flat_map(Matte::attributes));
     let channels = mattes.iter().flat_map(Matte::channels).collect();
     write(path, &Pixels { width, height, channels, data, window, attributes }, Kind::Float, Some("zip"))

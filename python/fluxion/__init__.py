@@ -15,6 +15,7 @@ import os
 from pathlib import Path
 
 from . import data
+from ._dicts import load_dict
 from ._fluxion import (
     FluxionError,
     Frame,
@@ -24,6 +25,7 @@ from ._fluxion import (
     __version__,
     compare,
     load_file,
+    load_string,
     methods,
     metrics,
     read_image,
@@ -41,7 +43,9 @@ __all__ = [
     "__version__",
     "compare",
     "data",
+    "load_dict",
     "load_file",
+    "load_string",
     "methods",
     "metrics",
     "read_image",

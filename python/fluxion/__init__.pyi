@@ -1,4 +1,4 @@
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from os import PathLike
 
 import numpy as np
@@ -37,7 +37,7 @@ class Frame:
     @staticmethod
     def from_renders(colors: Sequence[ArrayLike], *, spp: int, **layers: ArrayLike) -> Frame: ...
     @staticmethod
-    def load(path: _Path, *, spp: int | None = None) -> Frame: ...
+    def load(path: _Path, *, spp: int | None = None, view_layer: str | None = None) -> Frame: ...
     def save(self, path: _Path) -> None: ...
     @property
     def width(self) -> int: ...
@@ -91,6 +91,31 @@ def load_file(
     texture_memory: int = 4096,
     light_groups: str | None = None,
     **defines: object,
+) -> Scene: ...
+def load_string(
+    xml: str,
+    *,
+    size: tuple[int, int] | None = None,
+    crop: tuple[int, int, int, int] | None = None,
+    sensor: str | int | None = None,
+    max_depth: int | None = None,
+    strict: bool = False,
+    threads: int = 0,
+    texture_memory: int = 4096,
+    light_groups: str | None = None,
+    **defines: object,
+) -> Scene: ...
+def load_dict(
+    scene: Mapping[str, object],
+    *,
+    size: tuple[int, int] | None = None,
+    crop: tuple[int, int, int, int] | None = None,
+    sensor: str | int | None = None,
+    max_depth: int | None = None,
+    strict: bool = False,
+    threads: int = 0,
+    texture_memory: int = 4096,
+    light_groups: str | None = None,
 ) -> Scene: ...
 def render(
     scene: Scene | _Path,

@@ -1,12 +1,13 @@
 //! Frames.
 
+use std::ffi::CString;
 use std::path::PathBuf;
 use std::sync::Arc;
 
 use fluxion::film::{Frame as Layers, Layer};
 use fluxion::{Image, exr};
 use numpy::PyArray3;
-use pyo3::exceptions::{PyKeyError, PyValueError};
+use pyo3::exceptions::{PyKeyError, PyUserWarning, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -64,11 +65,16 @@ impl Frame {
     }
 
     /// Reads an EXR file of layers, as `save` and `fluxion render --layers` write it, or of another renderer's auxiliary
-    /// channels, with `spp` samples where the file does not say how many.
+    /// channels, with `spp` samples where the file does not say how many, and of several view layers the one of a name.
     #[staticmethod]
-    #[pyo3(signature = (path, *, spp=None))]
-    fn load(py: Python<'_>, path: PathBuf, spp: Option<u32>) -> PyResult<Self> {
-        let frame = work::run(py, 0, None, move |_| exr::load_counted(&path, spp))?;
+    #[pyo3(signature = (path, *, spp=None, view_layer=None))]
+    fn load(py: Python<'_>, path: PathBuf, spp: Option<u32>, view_layer: Option<String>) -> PyResult<Self> {
+        let (frame, warning) = work::run(py, 0, None, move |_| {
+            exr::load_other(&path, exr::Reading { spp, view_layer: view_layer.as_deref() })
+        })?;
+        if let Some(warning) = warning {
+            PyErr::warn(py, &py.get_type::<PyUserWarning>(), &CString::new(warning.replace('\0', " "))?, 2)?;
+        }
         Ok(Self(Arc::new(frame)))
     }
 

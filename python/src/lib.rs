@@ -24,7 +24,7 @@ mod _fluxion {
     #[pymodule_export]
     use crate::render::{Rendering, render};
     #[pymodule_export]
-    use crate::scene::{Scene, load_file};
+    use crate::scene::{Scene, class_of, load_file, load_lines, load_string};
     use pyo3::prelude::*;
 
     #[pymodule_init]

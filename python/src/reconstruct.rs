@@ -1,9 +1,11 @@
 //! Reconstructions.
 
+use std::ffi::CString;
 use std::sync::Arc;
 
 use fluxion::reconstruct::{Context, DEFAULT, Note, Reconstruction, light_groups, parse, solve};
 use numpy::PyArray3;
+use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -118,6 +120,9 @@ pub fn reconstruct(
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Solution> {
     let method = parse(method).map_err(raised)?;
+    for warning in method.warnings(&frame.0) {
+        PyErr::warn(py, &py.get_type::<PyUserWarning>(), &CString::new(warning.replace('\0', " "))?, 2)?;
+    }
     let (frame, wishes) = (Arc::clone(&frame.0), Wishes { memory, notes });
     let solved = work::run(py, threads, progress, move |link| wishes.solve(method.as_ref(), &frame, link))?;
     Ok(Solution(solved))

@@ -1,10 +1,10 @@
 //! Scenes.
 
 use std::ffi::CString;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use fluxion::scene::load::{self, Options};
+use fluxion::scene::load::{self, Line, Options};
 use fluxion::scene::sensor::Crop;
 use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
@@ -16,9 +16,64 @@ use crate::work;
 #[pyclass(frozen, module = "fluxion")]
 pub struct Scene {
     scene: Arc<fluxion::Scene>,
-    path: PathBuf,
+    source: Source,
     options: Options,
     light_groups: Option<String>,
+    /// Owner of files that were written for the scene, and that may be read again.
+    _files: Option<Py<PyAny>>,
+}
+
+/// Text of a scene.
+#[derive(Clone)]
+enum Source {
+    File(PathBuf),
+    Text(Arc<str>),
+    Lines(Arc<[Line]>),
+}
+
+impl Source {
+    fn load(&self, options: &Options) -> fluxion::Result<fluxion::Scene> {
+        match self {
+            Self::File(path) => load::load(path, options),
+            Self::Text(text) => load::load_text(text, options),
+            Self::Lines(lines) => load::load_lines(lines, options),
+        }
+    }
+
+    /// Name of the file, or one in its place.
+    fn path(&self) -> PathBuf {
+        match self {
+            Self::File(path) => path.clone(),
+            Self::Text(_) => "scene.xml".into(),
+            Self::Lines(_) => "scene".into(),
+        }
+    }
+}
+
+/// Keyword arguments of everything that reads scenes: options, and under all other names values of the file's parameters.
+fn options(keywords: Option<&Bound<'_, PyDict>>) -> PyResult<(Options, Option<String>)> {
+    let mut options = Options::default();
+    let mut light_groups = None;
+    for (name, value) in keywords.into_iter().flatten() {
+        let name: String = name.extract()?;
+        match name.as_str() {
+            // Options that are not given.
+            "size" | "crop" | "sensor" | "max_depth" | "light_groups" if value.is_none() => {}
+            "size" => options.size = Some(value.extract()?),
+            "crop" => {
+                let (x, y, width, height) = value.extract()?;
+                options.crop = Some(Crop { x, y, width, height });
+            }
+            "sensor" => options.sensor = Some(text(&value)?),
+            "max_depth" => options.max_depth = Some(value.extract()?),
+            "strict" => options.strict = value.extract()?,
+            "threads" => options.threads = value.extract()?,
+            "texture_memory" => options.texture_memory = value.extract::<u64>()?.saturating_mul(1 << 20),
+            "light_groups" => light_groups = Some(value.extract()?),
+            _ => options.parameters.push((name, text(&value)?)),
+        }
+    }
+    Ok((options, light_groups))
 }
 
 /// Reads a scene file in the format of Mitsuba 3.
@@ -29,34 +84,43 @@ pub struct Scene {
 /// `texture_memory` megabytes. `light_groups` names groups of emitters whose light is recorded by itself, by patterns of their ids or
 /// those of their shapes: `"key=lamp*,fill=window*,rest"`. Warnings of the reader are Python's; with `strict` they are errors.
 #[pyfunction]
-#[pyo3(signature = (path, *, size=None, crop=None, sensor=None, max_depth=None, strict=false, threads=0, texture_memory=4096, light_groups=None, **defines))]
-#[allow(clippy::too_many_arguments)]
-pub fn load_file(
+#[pyo3(signature = (path, **keywords))]
+#[pyo3(
+    text_signature = "(path, *, size=None, crop=None, sensor=None, max_depth=None, strict=False, threads=0, texture_memory=4096, light_groups=None, **defines)"
+)]
+pub fn load_file(py: Python<'_>, path: PathBuf, keywords: Option<&Bound<'_, PyDict>>) -> PyResult<Scene> {
+    let (options, light_groups) = options(keywords)?;
+    load(py, Source::File(path), options, light_groups, None)
+}
+
+/// Reads a scene from the text of a scene file, with the keywords of `load_file`. Files that it names are looked for in the current
+/// folder.
+#[pyfunction]
+#[pyo3(signature = (xml, **keywords))]
+pub fn load_string(py: Python<'_>, xml: &str, keywords: Option<&Bound<'_, PyDict>>) -> PyResult<Scene> {
+    let (options, light_groups) = options(keywords)?;
+    load(py, Source::Text(xml.into()), options, light_groups, None)
+}
+
+/// Reads a scene from lines of XML with the places that they are named by in messages. `files` owns files that they name.
+#[pyfunction]
+#[pyo3(signature = (lines, files, **keywords))]
+pub fn load_lines(
     py: Python<'_>,
-    path: PathBuf,
-    size: Option<(usize, usize)>,
-    crop: Option<(usize, usize, usize, usize)>,
-    sensor: Option<Bound<'_, PyAny>>,
-    max_depth: Option<u32>,
-    strict: bool,
-    threads: usize,
-    texture_memory: u64,
-    light_groups: Option<String>,
-    defines: Option<&Bound<'_, PyDict>>,
+    lines: Vec<(String, String)>,
+    files: Py<PyAny>,
+    keywords: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<Scene> {
-    let define = |(name, value): (Bound<'_, PyAny>, Bound<'_, PyAny>)| Ok((name.extract()?, text(&value)?));
-    let options = Options {
-        parameters: defines.into_iter().flatten().map(define).collect::<PyResult<_>>()?,
-        sensor: sensor.as_ref().map(text).transpose()?,
-        size,
-        crop: crop.map(|(x, y, width, height)| Crop { x, y, width, height }),
-        max_depth,
-        strict,
-        threads,
-        texture_memory: texture_memory.saturating_mul(1 << 20),
-        ..Options::default()
-    };
-    load(py, path, options, light_groups)
+    let (options, light_groups) = options(keywords)?;
+    let line = |(origin, xml): (String, String)| Line { origin: Path::new(&origin).into(), xml };
+    let lines = lines.into_iter().map(line).collect();
+    load(py, Source::Lines(lines), options, light_groups, Some(files))
+}
+
+/// The element of scene files that a plugin is written as; None of one that is not known.
+#[pyfunction]
+pub fn class_of(plugin: &str) -> Option<&'static str> {
+    load::class_of(plugin)
 }
 
 /// A value as scene files have it.
@@ -65,10 +129,16 @@ fn text(value: &Bound<'_, PyAny>) -> PyResult<String> {
     Ok(if value.is_instance_of::<pyo3::types::PyBool>() { text.to_lowercase() } else { text })
 }
 
-fn load(py: Python<'_>, path: PathBuf, options: Options, light_groups: Option<String>) -> PyResult<Scene> {
-    let (from, by, groups) = (path.clone(), options.clone(), light_groups.clone());
+fn load(
+    py: Python<'_>,
+    source: Source,
+    options: Options,
+    light_groups: Option<String>,
+    files: Option<Py<PyAny>>,
+) -> PyResult<Scene> {
+    let (from, by, groups) = (source.clone(), options.clone(), light_groups.clone());
     let scene = work::run(py, 0, None, move |_| {
-        let mut scene = load::load(&from, &by)?;
+        let mut scene = from.load(&by)?;
         groups.map_or(Ok(()), |groups| scene.group_lights(&groups))?;
         Ok(scene)
     })?;
@@ -76,7 +146,7 @@ fn load(py: Python<'_>, path: PathBuf, options: Options, light_groups: Option<St
     for warning in scene.warnings() {
         PyErr::warn(py, &category, &CString::new(warning.replace('\0', " "))?, 2)?;
     }
-    Ok(Scene { scene: Arc::new(scene), path, options, light_groups })
+    Ok(Scene { scene: Arc::new(scene), source, options, light_groups, _files: files })
 }
 
 #[pymethods]
@@ -102,7 +172,7 @@ impl Scene {
     /// The scene file.
     #[getter]
     fn path(&self) -> PathBuf {
-        self.path.clone()
+        self.source.path()
     }
 
     /// Warnings of the reader.
@@ -112,7 +182,7 @@ impl Scene {
     }
 
     fn __repr__(&self) -> String {
-        format!("<fluxion.Scene {} of {}x{} pixels>", self.path.display(), self.width(), self.height())
+        format!("<fluxion.Scene {} of {}x{} pixels>", self.source.path().display(), self.width(), self.height())
     }
 }
 
@@ -122,7 +192,7 @@ impl Scene {
         match size {
             Some(size) if size != (self.width(), self.height()) => {
                 let options = Options { size: Some(size), ..self.options.clone() };
-                Ok(load(py, self.path.clone(), options, self.light_groups.clone())?.scene)
+                Ok(load(py, self.source.clone(), options, self.light_groups.clone(), None)?.scene)
             }
             _ => Ok(Arc::clone(&self.scene)),
         }
@@ -140,10 +210,10 @@ impl SceneOrPath<'_> {
     /// The scene, with a film of another size if one is given.
     pub fn scene(self, py: Python<'_>, size: Option<(usize, usize)>) -> PyResult<(Arc<fluxion::Scene>, PathBuf)> {
         match self {
-            Self::Scene(scene) => Ok((scene.get().sized(py, size)?, scene.get().path.clone())),
+            Self::Scene(scene) => Ok((scene.get().sized(py, size)?, scene.get().source.path())),
             Self::Path(path) => {
-                let scene = load(py, path, Options { size, ..Options::default() }, None)?;
-                Ok((scene.scene, scene.path))
+                let scene = load(py, Source::File(path.clone()), Options { size, ..Options::default() }, None, None)?;
+                Ok((scene.scene, path))
             }
         }
     }

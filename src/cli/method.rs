@@ -5,8 +5,11 @@ use std::time::Instant;
 
 use anyhow::{Context as _, Result, bail};
 use fluxion::film::{Frame, Layer};
+use fluxion::image::Image;
 use fluxion::image::io::{self, Extras};
 use fluxion::reconstruct::{self, Context, Reconstruction, Solution};
+
+use fluxion::scene::sensor::Crop;
 
 use super::progress;
 use super::stats::Stats;
@@ -90,9 +93,10 @@ impl Args {
 }
 
 /// Writes the image to every output, with estimated error, sample counts and the light of groups of emitters where the format has
-/// layers, and takes the time. If it cannot be written anywhere, it goes to the folder for temporary files.
+/// layers, and takes the time; of it all only a part, if that is given. If it cannot be written anywhere, it goes to the folder for
+/// temporary files.
 pub fn write(
-    (args, method): (&Args, &dyn Reconstruction),
+    (args, method, inner): (&Args, &dyn Reconstruction, Option<Crop>),
     outputs: &[PathBuf],
     solution: &Solution,
     frame: &Frame,
@@ -104,23 +108,26 @@ pub fn write(
     } else {
         Vec::new()
     };
-    let lights: Vec<_> = lights.into_iter().map(|note| (format!("light.{}", note.name), note.image)).collect();
     stats.seconds.reconstruct += start.elapsed().as_secs_f64();
     let start = Instant::now();
-    let error = solution.error.as_ref().map(|error| ("error", error));
-    let samples = frame.get(Layer::Samples).map(|samples| ("samples", samples));
+    let shown = |image: &Image| match inner {
+        Some(Crop { x, y, width, height }) => image.part((x, y), (width, height)),
+        None => image.clone(),
+    };
+    let error = solution.error.iter().map(|error| ("error".to_owned(), shown(error)));
+    let samples = frame.get(Layer::Samples).map(|samples| ("samples".to_owned(), shown(samples)));
+    let lights = lights.iter().map(|note| (format!("light.{}", note.name), shown(&note.image)));
+    let layers: Vec<_> = error.chain(samples).chain(lights).collect();
+    let alpha = solution.alpha.as_ref().or(frame.get(Layer::Alpha)).map(shown);
+    let image = shown(&solution.image);
     let extras = Extras {
-        alpha: solution.alpha.as_ref().or(frame.get(Layer::Alpha)),
-        layers: error
-            .into_iter()
-            .chain(samples)
-            .chain(lights.iter().map(|(name, image)| (name.as_str(), image)))
-            .collect(),
+        alpha: alpha.as_ref(),
+        layers: layers.iter().map(|(name, image)| (name.as_str(), image)).collect(),
         attributes: frame.provenance.attributes(),
-        window: frame.window,
+        window: inner.map(|inner| inner.within(frame.window, (frame.width, frame.height))).or(frame.window),
         exposure: args.exposure,
     };
-    let put = |path: &Path| io::write_color(path, &solution.image, &extras);
+    let put = |path: &Path| io::write_color(path, &image, &extras);
     let (mut written, mut failed) = (Vec::new(), Vec::new());
     for path in outputs {
         match put(path) {

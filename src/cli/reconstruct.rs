@@ -74,7 +74,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let solution = args.method.solve(method.as_ref(), &frame, args.quiet, &mut stats);
     let solution = solution.map_err(|error| with_others(error, &frame))?;
     frame.provenance.method.clone_from(&args.method.method);
-    method::write((&args.method, method.as_ref()), &args.output, &solution, &frame, &mut stats)?;
+    method::write((&args.method, method.as_ref(), None), &args.output, &solution, &frame, &mut stats)?;
     if let Some(path) = &args.json {
         stats.save(path)?;
     }

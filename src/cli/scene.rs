@@ -23,6 +23,10 @@ pub struct Args {
     /// Part of the film to render, as its first column and row and its size: 100,50,320x180
     #[arg(long, value_parser = parse_crop, value_name = "X,Y,WxH")]
     pub crop: Option<Crop>,
+    /// Pixels to render and reconstruct around the part, so that no seam shows where images of parts are put together; images have
+    /// the part alone
+    #[arg(long, default_value_t = 0, value_name = "N", hide_short_help = true)]
+    pub overscan: usize,
     /// Longest paths in edges in place of the scene's: 1 is visible emitters only, 2 adds direct light, -1 is no limit
     #[arg(long, allow_negative_numbers = true, value_name = "N", value_parser = parse_depth)]
     pub max_depth: Option<u32>,
@@ -39,6 +43,7 @@ impl Args {
             sensor: self.sensor.clone(),
             size: self.size,
             crop: self.crop,
+            overscan: self.overscan,
             max_depth: self.max_depth,
             strict: self.strict,
             ..load::Options::default()
@@ -51,10 +56,11 @@ impl Args {
         let sensor = self.sensor.iter().map(|sensor| format!(" --sensor {sensor}"));
         let size = self.size.iter().map(|(width, height)| format!(" --size {width}x{height}"));
         let crop = self.crop.iter().map(|crop| format!(" --crop {crop}"));
+        let overscan = (self.overscan > 0).then(|| format!(" --overscan {}", self.overscan));
         let depth = self.max_depth.map(|depth| {
             if depth == u32::MAX { " --max-depth -1".to_owned() } else { format!(" --max-depth {depth}") }
         });
-        definitions.chain(sensor).chain(size).chain(crop).chain(depth).collect()
+        definitions.chain(sensor).chain(size).chain(crop).chain(overscan).chain(depth).collect()
     }
 }
 

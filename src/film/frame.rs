@@ -80,9 +80,7 @@ impl Frame {
         let (width, height) = (self.width.min(side), self.height.min(side));
         let mut corner = Self { provenance: self.provenance.clone(), ..Self::new(width, height) };
         for (layer, image) in self.present() {
-            let row = |y: usize| &image.data[y * self.width * image.channels..][..width * image.channels];
-            let data = (0..height).flat_map(row).copied().collect();
-            corner.set(layer, Image { width, height, channels: image.channels, data });
+            corner.set(layer, image.part((0, 0), (width, height)));
         }
         corner
     }

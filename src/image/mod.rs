@@ -42,6 +42,13 @@ impl Image {
         Self { width, height, channels: 3, data }
     }
 
+    /// A part of the image from a pixel on.
+    pub fn part(&self, (x, y): (usize, usize), (width, height): (usize, usize)) -> Self {
+        let row = |row: usize| &self.data[(row * self.width + x) * self.channels..][..width * self.channels];
+        let data = (y..y + height).flat_map(row).copied().collect();
+        Self { width, height, channels: self.channels, data }
+    }
+
     /// Whether there is no pixel.
     pub fn is_empty(&self) -> bool {
         self.width * self.height == 0

@@ -36,7 +36,7 @@ pub use self::gradient::{SHIFTS, Shift};
 pub use self::outcome::RenderOutcome;
 pub use self::sampler::Sampler;
 pub use self::schedule::{Budget, RenderSettings, render, render_to_counts, resume, resume_to_counts, sample};
-pub use self::shown::{ShownShapes, shown_shapes};
+pub use self::shown::{Shown, ShownShapes, shown_shapes};
 pub use self::wave::Samples;
 
 /// One sample of one pixel, the same whenever and wherever it is asked for.

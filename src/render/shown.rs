@@ -10,8 +10,17 @@ use crate::scene::bsdf::Lobe;
 use crate::scene::packet::Surfaces;
 use crate::scene::{Ray, Scene, Surface};
 
-/// Shapes that a pixel shows, by their numbers, and how many of its samples show each.
-pub type ShownShapes = Vec<(u32, u32)>;
+/// A shape, by its number, and the instance that it is in, `u32::MAX` if it is in none.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Shown {
+    /// Number of the shape.
+    pub shape: u32,
+    /// Number of the instance.
+    pub instance: u32,
+}
+
+/// Shapes that a pixel shows, and how many of its samples show each.
+pub type ShownShapes = Vec<(Shown, u32)>;
 
 /// Surfaces that are passed before one counts whatever its material: more is a mistake of rounding.
 const MOST_PASSED: u32 = 256;
@@ -36,7 +45,7 @@ pub fn shown_shapes(scene: &Scene, seed: u64, spp: u32) -> Vec<ShownShapes> {
                     scene.pass_emitters(&rays, &mut hit, &mut surfaces);
                 }
                 for lane in hit.lanes() {
-                    let mut shape = Some(surfaces.shape.0[lane]);
+                    let mut shape = Some(Shown { shape: surfaces.shape.0[lane], instance: surfaces.instance.0[lane] });
                     if scene.shapes()[surfaces.shape.0[lane] as usize].bsdf.transmits() {
                         let (x, y) = pixels[first + lane];
                         let hash = rng::combine(seed, (y * width + x) as u64);
@@ -60,7 +69,7 @@ pub fn shown_shapes(scene: &Scene, seed: u64, spp: u32) -> Vec<ShownShapes> {
 const GOLDEN: f32 = 0.618_034;
 
 /// The shape that a ray shows from a surface on, whose holes it passes by chance. Sample number `index` of a pixel with its own `hash`.
-fn behind_holes(scene: &Scene, mut ray: Ray, mut surface: Surface, (hash, index): (u64, u32)) -> Option<u32> {
+fn behind_holes(scene: &Scene, mut ray: Ray, mut surface: Surface, (hash, index): (u64, u32)) -> Option<Shown> {
     for passed in 0..MOST_PASSED {
         let hole = scene.bsdf(&surface).delta(&surface, surface.wi, Lobe::Null);
         let chance = hole.map_or(0.0, |hole| hole.probability);
@@ -71,5 +80,5 @@ fn behind_holes(scene: &Scene, mut ray: Ray, mut surface: Surface, (hash, index)
         ray = Ray { origin, t_far: ray.t_far - origin.distance(ray.origin), ..ray };
         surface = scene.intersect_from_camera(ray)?;
     }
-    Some(surface.at.shape)
+    Some(Shown { shape: surface.at.shape, instance: surface.instance })
 }

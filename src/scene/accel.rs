@@ -112,7 +112,7 @@ impl Accel {
     pub fn surface(&self, shapes: &[Shape], hit: &Hit, ray: Ray) -> Surface {
         let Some(instance) = hit.instance() else { return shape_surface(shapes, hit.geometry, hit, ray) };
         let placement = &self.placements[(instance - self.first_placement) as usize];
-        placement.surface(shapes, hit, ray)
+        Surface { instance: instance - self.first_placement, ..placement.surface(shapes, hit, ray) }
     }
 
     /// Whether the open segment between two points is occluded.
@@ -162,6 +162,7 @@ fn attach(builder: &mut SceneBuilder, shapes: &[Shape]) -> Result<Bounds> {
             Geometry::Sphere(sphere) => builder.add_spheres(vec![sphere.center.extend(sphere.radius).to_array()])?,
             Geometry::Disk(disk) => builder.add_quadric(disk.quadric())?,
             Geometry::Cylinder(cylinder) => builder.add_quadric(cylinder.quadric())?,
+            Geometry::Curves(curves) => builder.add_curves(curves.data())?,
         };
     }
     Ok(bounds)

@@ -90,6 +90,8 @@ pub struct Group {
     pub shapes: Vec<Shape>,
     /// Group to world.
     pub placements: Vec<Mat4>,
+    /// Ids of the instances, or their types and lines.
+    pub names: Vec<Arc<str>>,
 }
 
 /// Everything that a scene is built from, as loaders find it.
@@ -125,6 +127,7 @@ pub struct Scene {
     accel: Accel,
     /// Shapes in world space, then those of the groups.
     shapes: Vec<Shape>,
+    instance_names: Vec<Arc<str>>,
     emitters: Vec<Box<dyn Emitter>>,
     emitter_names: Vec<Arc<str>>,
     light_groups: LightGroups,
@@ -150,6 +153,7 @@ impl Scene {
     pub fn build(parts: SceneDescription, threads: usize) -> Result<Self> {
         let SceneDescription { mut shapes, groups, mut emitters, sensor, integrator, fingerprint, files, .. } = parts;
         let accel = Accel::build(&shapes, &groups, threads)?;
+        let instance_names = groups.iter().flat_map(|group| group.names.iter().cloned()).collect();
         shapes.extend(groups.into_iter().flat_map(|group| group.shapes));
         let numbered = (0u32..).zip(&emitters);
         let environments: Vec<_> = numbered.filter(|(_, emitter)| emitter.is_environment()).map(|(i, _)| i).collect();
@@ -169,6 +173,7 @@ impl Scene {
             accel,
             shapes,
             emitters,
+            instance_names,
             emitter_names: parts.emitter_names,
             light_groups: LightGroups::default(),
             emitter_choice,
@@ -292,6 +297,11 @@ impl Scene {
     /// Shapes with their materials; those of a group once, however often it is placed.
     pub fn shapes(&self) -> &[Shape] {
         &self.shapes
+    }
+
+    /// Ids of the instances of groups, or their types and lines, by number.
+    pub fn instance_names(&self) -> &[Arc<str>] {
+        &self.instance_names
     }
 
     /// All emitters.

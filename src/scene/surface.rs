@@ -14,6 +14,8 @@ pub struct Surface {
     pub frame: Frame,
     /// Texture coordinates.
     pub at: texture::Point,
+    /// Number of the instance that the shape is in; `u32::MAX` if it is in none.
+    pub instance: u32,
     /// Change of position along u. Zero unless the material asked for it.
     pub dp_du: Vec3,
     /// Change of position along v. Zero unless the material asked for it.
@@ -36,6 +38,7 @@ impl Default for Surface {
             n: up,
             frame,
             at: texture::Point::default(),
+            instance: u32::MAX,
             dp_du: zero,
             dp_dv: zero,
             epsilon: 0.0,

@@ -61,6 +61,7 @@ const FFI_USERS: &[&str] = &[
     "src/scene/shape/mesh.rs",
     "src/scene/shape/sphere.rs",
     "src/scene/shape/disk.rs",
+    "src/scene/shape/curves.rs",
     "src/scene/shape/cylinder.rs",
 ];
 

@@ -10,6 +10,7 @@ mod common;
 mod comparators;
 mod coordinates;
 mod corrupt;
+mod curves;
 mod dataset;
 mod edges;
 mod film;

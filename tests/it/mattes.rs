@@ -86,3 +86,27 @@ fn shares_are_those_of_the_shapes_and_read_by_others() {
     let of_pixel = |pixel: usize| names[channels["object.id"][pixel] as usize - 1].as_str();
     assert_eq!((of_pixel(0), of_pixel(1)), ("back", "leaf"));
 }
+
+#[test]
+fn instances_of_a_group_are_told_apart() {
+    let scene = crate::common::scene(
+        r#"<sensor type="orthographic"><transform name="to_world"><lookat origin="0,0,5" target="0,0,0" up="0,1,0"/></transform>
+        <film type="hdrfilm"><integer name="width" value="2"/><integer name="height" value="1"/></film></sensor>
+        <shape type="shapegroup" id="group"><shape type="sphere" id="ball"><float name="radius" value="0.3"/></shape></shape>
+        <shape type="instance" id="left"><ref id="group"/><transform name="to_world"><translate x="-0.5"/></transform></shape>
+        <shape type="instance" id="right"><ref id="group"/><transform name="to_world"><translate x="0.5"/></transform></shape>
+        <shape type="rectangle" id="wall"><transform name="to_world"><scale value="4"/><translate z="-1"/></transform></shape>"#,
+    );
+    let mattes = fluxion::mattes::mattes(&scene, 0, 16);
+    let names = |kind: usize, pixel: usize| {
+        let mut names: Vec<_> = mattes[kind].pixels[pixel].iter().map(|(name, _)| name.to_string()).collect();
+        names.sort();
+        names
+    };
+    assert_eq!((mattes.len(), mattes[2].name), (3, "CryptoInstance"));
+    // The film's x runs to the left of the camera's.
+    let sides = [names(2, 0), names(2, 1)];
+    assert!(sides.contains(&vec!["left".to_owned(), "wall".into()]), "{sides:?}");
+    assert!(sides.contains(&vec!["right".to_owned(), "wall".into()]), "{sides:?}");
+    assert_eq!((names(0, 0), names(0, 1)), (vec!["ball".into(), "wall".into()], vec!["ball".into(), "wall".into()]));
+}

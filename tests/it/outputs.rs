@@ -133,3 +133,32 @@ fn a_dash_is_standard_output() {
     let output = fluxion(folder.path()).args(["compare", "a.exr", "a.exr", "--json=-"]).output().unwrap();
     assert!(serde_json::from_slice::<serde_json::Value>(&output.stdout).is_ok());
 }
+
+#[test]
+fn windows_with_overscan_fit_together() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = crate::common::root().join("scenes/cornell-box/scene.xml").display().to_string();
+    let render = |name: &str, more: &[&str]| {
+        let command = ["render", &scene, "--spp", "8", "--method", "frgr", "-q", "--size", "48x32", "-o", name];
+        crate::cli::fluxion(folder.path()).args(command).args(more).assert().success();
+        fluxion::image::io::read(&folder.path().join(name), &[]).unwrap()
+    };
+    let whole = render("whole.exr", &[]);
+    let (plain, wide) = (
+        render("plain.exr", &["--crop", "16,8,16x16"]),
+        render("wide.exr", &["--crop", "16,8,16x16", "--overscan", "100", "--cryptomatte", "mattes.exr"]),
+    );
+    let mattes = fluxion::image::io::read(&folder.path().join("mattes.exr"), &[]).unwrap();
+    assert_eq!((wide.width, wide.height, wide.window), (16, 16, plain.window));
+    assert_eq!((mattes.width, mattes.height, mattes.window), (16, 16, plain.window));
+    let red = |pixels: &fluxion::image::io::Pixels, x: usize, y: usize| {
+        let at = pixels.channels.iter().position(|name| name == "R").unwrap();
+        pixels.data[(y * pixels.width + x) * pixels.channels.len() + at]
+    };
+    let apart = |pixels: &fluxion::image::io::Pixels| {
+        let all = (0..16 * 16).map(|i| (i % 16, i / 16));
+        all.map(|(x, y)| (red(pixels, x, y) / red(&whole, x + 16, y + 8) - 1.0).abs()).fold(0.0, f32::max)
+    };
+    // Around it is the whole film.
+    assert!(apart(&wide) == 0.0 && apart(&plain) > 0.01, "{} {}", apart(&wide), apart(&plain));
+}

@@ -674,3 +674,27 @@ fn a_camera_that_cuts_everything_off_is_warned_of() {
     assert!(scene.warnings()[0].contains("nothing is between the camera's near_clip 50 and its far_clip 10000"));
     assert!(text(&file("3.0.0", "<shape type=\"sphere\"/>")).warnings().is_empty());
 }
+
+#[test]
+fn sensors_without_a_picture_are_refused_with_the_reason() {
+    let sensor = |body: &str| try_text(&format!("<scene version=\"3.0.0\">{body}</scene>")).err().unwrap().to_string();
+    for (body, expected) in [
+        (
+            "<shape type=\"sphere\"><sensor type=\"irradiancemeter\"/></shape>",
+            "`irradiancemeter` is not supported: it measures",
+        ),
+        ("<sensor type=\"batch\"/>", "`batch` is not supported: it is several sensors in one"),
+        ("<sensor type=\"fisheye\"/>", "`fisheye` is not known; there are perspective"),
+    ] {
+        assert!(sensor(body).contains(expected), "{}", sensor(body));
+    }
+    let measured = "<shape type=\"sphere\"><bsdf type=\"measured_polarized\"/></shape>";
+    assert!(try_text(&file("3.0.0", measured)).err().unwrap().to_string().contains("polarized light"));
+}
+
+#[test]
+fn types_in_capitals_and_references_in_the_scene_are_read() {
+    let body = "<shape type=\"Sphere\"/><emitter type=\"Constant\" id=\"sky\"/><ref id=\"sky\"/>";
+    near(centre_and_corner(&text(&file("3.0.0", body))).0, [0.5; 3], "capitals");
+    assert!(try_text(&file("3.0.0", "<ref id=\"nobody\"/>")).err().unwrap().to_string().contains("nothing has the id"));
+}

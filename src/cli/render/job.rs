@@ -56,7 +56,8 @@ impl Job<'_> {
             if let Some(viewer) = self.viewer {
                 viewer.show(&solution.image);
             }
-            method::write((&args.method, self.method), &args.output, &solution, &frame, stats)?;
+            let inner = self.scene.sensor().inner();
+            method::write((&args.method, self.method, inner), &args.output, &solution, &frame, stats)?;
         }
         layers?;
         if let Some(path) = &args.cryptomatte {
@@ -154,10 +155,9 @@ impl Job<'_> {
 
     /// Saves the shares of objects and materials, by as many samples as were taken.
     fn save_mattes(&self, path: &Path, stats: &mut Stats) -> Result<()> {
-        let (start, sensor) = (Instant::now(), self.scene.sensor());
+        let start = Instant::now();
         let mattes = mattes::mattes(self.scene, self.args.seed, stats.spp.clamp(1, MOST_SAMPLES));
-        let attributes = self.provenance(stats).attributes();
-        mattes::save(path, (sensor.width, sensor.height), &mattes, sensor.window(), attributes)?;
+        mattes::save(path, self.scene.sensor(), &mattes, self.provenance(stats).attributes())?;
         stats.seconds.write += start.elapsed().as_secs_f64();
         Ok(())
     }

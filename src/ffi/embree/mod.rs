@@ -25,6 +25,8 @@ use std::sync::{Arc, Mutex};
 use super::raw::embree as raw;
 use crate::error::{Error, Result};
 
+/// B-splines or straight pieces.
+pub use raw::FluxionCurveKind as CurveKind;
 /// The first intersection of a ray.
 pub use raw::FluxionHit as Hit;
 /// A disk or a cylinder.
@@ -129,6 +131,7 @@ enum Buffer {
     Triangles { _vertices: Arc<PaddedVertices>, _indices: Arc<Vec<[u32; 3]>> },
     Spheres { _spheres: Vec<[f32; 4]> },
     Quadric { _quadric: Box<Quadric> },
+    Curves { _curves: Arc<CurveData> },
     Instance { _child: Arc<Committed> },
 }
 
@@ -151,6 +154,25 @@ impl Hits {
             primitive: self.primitive[lane],
             instance: self.instance[lane],
         })
+    }
+}
+
+/// Round curves as segments of control points.
+pub struct CurveData {
+    /// B-splines or straight pieces.
+    pub kind: CurveKind,
+    /// Positions and radii.
+    pub points: Vec<[f32; 4]>,
+    /// Number of the first point of every segment.
+    pub starts: Vec<u32>,
+    /// Bit 1 for the first segment of a curve, and bit 2 for the last.
+    pub ends: Vec<u8>,
+}
+
+impl CurveData {
+    /// Number of points of a segment.
+    pub fn segment_length(&self) -> usize {
+        if self.kind == CurveKind::FLUXION_BSPLINE { 4 } else { 2 }
     }
 }
 
@@ -248,6 +270,32 @@ impl SceneBuilder {
         // SAFETY: the quadric is boxed and lives in `self.0.buffers` until the scene is released.
         let id = unsafe { raw::fluxion_scene_add_quadric(self.0.device.raw, self.0.raw, &*quadric) };
         self.0.buffers.push(Buffer::Quadric { _quadric: quadric });
+        self.0.device.check()?;
+        Ok(id)
+    }
+
+    /// Adds round curves and returns their common geometry number. Every segment must be within the control points.
+    pub fn add_curves(&mut self, curves: &Arc<CurveData>) -> Result<u32> {
+        let CurveData { kind, points, starts, ends } = &**curves;
+        let length = curves.segment_length();
+        if ends.len() != starts.len() || starts.iter().any(|&start| start as usize + length > points.len()) {
+            return Err(Error::backend("embree", "a segment of a curve names a point that does not exist"));
+        }
+        // SAFETY: the buffers have the stated lengths, every segment is within them, and `self.0.buffers` keeps them alive and
+        // unmoved until the scene is released.
+        let id = unsafe {
+            raw::fluxion_scene_add_curves(
+                self.0.device.raw,
+                self.0.raw,
+                *kind,
+                points.as_ptr().cast(),
+                points.len(),
+                starts.as_ptr(),
+                ends.as_ptr(),
+                starts.len(),
+            )
+        };
+        self.0.buffers.push(Buffer::Curves { _curves: Arc::clone(curves) });
         self.0.device.check()?;
         Ok(id)
     }

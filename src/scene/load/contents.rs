@@ -9,8 +9,9 @@ use super::{Loader, find};
 use crate::error::Result;
 use crate::math::{Vec2, Vec3};
 use crate::scene::emitter::{self, Emitter};
-use crate::scene::shape;
+use crate::scene::shape::Geometry;
 use crate::scene::{Bounds, Group, Shape, bsdf};
+use crate::scene::{sensor, shape};
 
 /// More shapes than this are taken for a mistake, such as merges of merges of merges.
 const MAX_SHAPES: usize = 1 << 20;
@@ -109,6 +110,7 @@ impl Contents {
             return Err(object.loc.invalid("coordinates are not finite"));
         }
         group.placements.push(to_world);
+        group.names.push(name(object));
         Ok(())
     }
 
@@ -134,7 +136,7 @@ impl Contents {
         let bounds = shapes.iter().fold(Bounds::EMPTY, |all, shape| all.union(shape.geometry.bounds()));
         let index = list.len();
         by_origin.insert(Rc::as_ptr(object), index);
-        list.push((bounds, Group { shapes, placements: Vec::new() }));
+        list.push((bounds, Group { shapes, placements: Vec::new(), names: Vec::new() }));
         Ok(&mut list[index])
     }
 }
@@ -177,11 +179,15 @@ fn single(object: &Object, loader: &mut Loader, (shape_number, emitter_number): 
                 radiance = Some((loader.radiance(&nested, "radiance")?, nested.id.clone(), weight));
                 loader.all_used(&nested, "radiance")?;
             }
+            "sensor" => return Err(super::unknown(&nested, sensor::PLUGINS.iter().map(|(name, _)| *name))),
             other => {
                 let what = format!("{other} `{}` in a shape; it takes a bsdf and an area emitter", nested.plugin);
                 return Err(nested.loc.unsupported(what));
             }
         }
+    }
+    if let (Geometry::Curves(_), Some(_)) = (&*geometry, &radiance) {
+        return Err(object.loc.unsupported("an emitter on curves, whose points cannot be sampled"));
     }
     // How derivatives are estimated.
     object.ignore(&["silhouette_sampling_weight"]);

@@ -27,8 +27,10 @@ use self::contents::Contents;
 pub use self::loader::Loader;
 pub use self::mesh::MeshData;
 use self::props::Object;
-use super::sensor::{self, Crop, Sensor, SensorInfo};
-use super::{Integrator, Scene, SceneDescription, texture};
+pub use self::xml::Line;
+use self::xml::Source;
+use super::sensor::{self, Crop, FilmOptions, Sensor, SensorInfo};
+use super::{Integrator, Scene, SceneDescription, bsdf, emitter, shape, texture};
 use crate::error::{Error, Result, SourceLoc};
 use crate::math::rng;
 
@@ -45,6 +47,8 @@ pub struct Options {
     pub size: Option<(usize, usize)>,
     /// Part of the film to render in place of the file's.
     pub crop: Option<Crop>,
+    /// Pixels to render around that part, so that images of parts fit together after a reconstruction that looks around.
+    pub overscan: usize,
     /// Longest paths in edges in place of the file's; `u32::MAX`: no bound.
     pub max_depth: Option<u32>,
     /// Whether the loader's warnings are errors.
@@ -63,6 +67,7 @@ impl Default for Options {
             sensor_optional: false,
             size: None,
             crop: None,
+            overscan: 0,
             max_depth: None,
             strict: false,
             threads: 0,
@@ -91,13 +96,34 @@ pub fn name(path: &Path) -> String {
 
 /// Loads a scene file with everything it refers to.
 pub fn load(path: &Path, options: &Options) -> Result<Scene> {
-    load_tree(path, &|| xml::parse(path, None, &options.parameters, options.strict), options)
+    load_tree(path, &|| xml::parse(path, Source::File, &options.parameters, options.strict), options)
 }
 
 /// Loads a scene from the text of a scene file. Files that it names are looked for in the current folder.
 pub fn load_text(text: &str, options: &Options) -> Result<Scene> {
     let path = Path::new("scene.xml");
-    load_tree(path, &|| xml::parse(path, Some(text), &options.parameters, options.strict), options)
+    load_tree(path, &|| xml::parse(path, Source::Text(text), &options.parameters, options.strict), options)
+}
+
+/// Loads a scene from the lines of a scene file that was made from something else, whose origins are named in messages. Files
+/// that it names are looked for in the current folder.
+pub fn load_lines(lines: &[Line], options: &Options) -> Result<Scene> {
+    let path = Path::new("scene");
+    load_tree(path, &|| xml::parse(path, Source::Lines(lines), &options.parameters, options.strict), options)
+}
+
+/// The element that a plugin is written as, if it is known.
+pub fn class_of(plugin: &str) -> Option<&'static str> {
+    let shapes = shape::PLUGINS.iter().map(|row| row.name).chain(CONTAINERS.iter().map(|(name, _)| *name));
+    let classes: [(&str, Vec<&str>); 5] = [
+        ("shape", shapes.collect()),
+        ("bsdf", bsdf::PLUGINS.iter().map(|row| row.name).collect()),
+        ("emitter", emitter::PLUGINS.iter().map(|row| row.name).chain(["area"]).collect()),
+        ("texture", texture::PLUGINS.iter().map(|row| row.name).collect()),
+        ("sensor", sensor::PLUGINS.iter().map(|(name, _)| *name).collect()),
+    ];
+    let known = classes.iter().find(|(_, names)| names.contains(&plugin)).map(|(class, _)| *class);
+    known.or_else(|| UNSUPPORTED.iter().find(|(_, name, _)| *name == plugin).map(|(class, ..)| *class))
 }
 
 /// Loads what is parsed. A scene far from the origin is loaded once more with an origin near its camera: floats there are too
@@ -142,7 +168,10 @@ fn build(path: &Path, tree: xml::Tree, options: &Options, origin: DVec3) -> Resu
     }
     let loc = SourceLoc::file(path);
     let sensor = match choose(&sensors, options, &loc)? {
-        Some(object) => sensor::load(object, &loader, options.size, options.crop)?,
+        Some(object) => {
+            let Options { size, crop, overscan, .. } = *options;
+            sensor::load(object, &loader, FilmOptions { size, crop, overscan })?
+        }
         None => Sensor::default(),
     };
     let sensors = sensors.into_iter().map(|object| SensorInfo::new(object)).collect();
@@ -204,8 +233,10 @@ fn fingerprint(tree: &xml::Tree, options: &Options) -> u64 {
     given.sort();
     let definitions = given.iter().flat_map(|(name, value)| [name, value]);
     let crop = options.crop.map(|crop| crop.to_string());
+    let overscan = (options.overscan > 0).then(|| format!("overscan {}", options.overscan));
     let depth = options.max_depth.map(|depth| format!("max_depth {depth}"));
-    let texts = tree.sources.iter().chain(definitions).chain(&options.sensor).chain(&crop).chain(&depth);
+    let texts =
+        tree.sources.iter().chain(definitions).chain(&options.sensor).chain(&crop).chain(&overscan).chain(&depth);
     texts.flat_map(|text| text.bytes()).fold(0, |hash, byte| rng::combine(hash, u64::from(byte)))
 }
 
@@ -215,18 +246,26 @@ pub const UNSUPPORTED: &[(&str, &str, &str)] = &[
     ("emitter", "area", "it lights a shape: nest it in one, or give it an id and refer to it in one"),
     ("emitter", "collimated", "paths from the camera never meet its single ray; use a narrow spot"),
     ("emitter", "directionalarea", "paths from the camera never meet its parallel light; use a spot or an area"),
-    ("bsdf", "hair", "curves are not traced"),
+    ("bsdf", "hair", "its scattering is not there; principled comes near"),
     ("bsdf", "measured", "measured materials are not read; principled comes near"),
+    ("bsdf", "measured_polarized", "it is measured for polarized light, which is not traced; principled comes near"),
     ("bsdf", "hk", "media are not supported"),
     ("bsdf", "difftrans", "principledthin with diff_trans comes near"),
     ("bsdf", "irawan", "woven cloth is not read; roughdiffuse comes near"),
-    ("shape", "hair", "curves are not traced; export them as a mesh"),
+    ("shape", "hair", "its files are not read; export it as a bsplinecurve or a linearcurve"),
     ("shape", "heightfield", "export it as a mesh"),
-    ("shape", "bsplinecurve", "curves are not traced; export them as a mesh"),
-    ("shape", "linearcurve", "curves are not traced; export them as a mesh"),
     ("shape", "sdfgrid", "distance fields are not traced; export them as a mesh"),
     ("shape", "ellipsoids", "splats are not traced"),
     ("shape", "ellipsoidsmesh", "splats are not traced"),
+    (
+        "sensor",
+        "irradiancemeter",
+        "it measures what a surface receives, and makes no picture; use perspective or orthographic",
+    ),
+    ("sensor", "radiancemeter", "it measures along a single ray; use perspective with a narrow field of view"),
+    ("sensor", "fluxmeter", "it measures what a surface receives, and makes no picture"),
+    ("sensor", "distant", "it sees from infinitely far away; use orthographic"),
+    ("sensor", "batch", "it is several sensors in one: write them one by one and choose by --sensor"),
     ("texture", "gridtexture", "use a checkerboard or an image"),
     ("texture", "vertexcolors", "use mesh_attribute with the name vertex_color"),
     ("texture", "wireframe", "edges of triangles are not drawn; use an image"),
@@ -236,16 +275,16 @@ pub const UNSUPPORTED: &[(&str, &str, &str)] = &[
 
 /// The table's row for an object, or an error that lists the known ones.
 pub fn find<'a, T>(table: &'a [Plugin<T>], object: &Object) -> Result<&'a Plugin<T>> {
-    table.iter().find(|plugin| plugin.name == object.plugin).ok_or_else(|| {
-        let (class, plugin) = (&object.class, &object.plugin);
-        let reason = UNSUPPORTED.iter().find(|(other, name, _)| other == class && name == plugin);
-        let what = match reason {
-            Some((.., reason)) => format!("{class} `{plugin}` is not supported: {reason}"),
-            None => {
-                let names: Vec<_> = table.iter().map(|plugin| plugin.name).collect();
-                format!("{class} `{plugin}` is not known; there are {}", names.join(", "))
-            }
-        };
-        object.loc.unsupported(what)
+    let found = table.iter().find(|plugin| plugin.name == object.plugin);
+    found.ok_or_else(|| unknown(object, table.iter().map(|plugin| plugin.name)))
+}
+
+/// The error of a plugin that is none of those of a table.
+pub fn unknown(object: &Object, known: impl Iterator<Item = &'static str>) -> Error {
+    let (class, plugin) = (&object.class, &object.plugin);
+    let reason = UNSUPPORTED.iter().find(|(other, name, _)| other == class && name == plugin);
+    object.loc.unsupported(match reason {
+        Some((.., reason)) => format!("{class} `{plugin}` is not supported: {reason}"),
+        None => format!("{class} `{plugin}` is not known; there are {}", known.collect::<Vec<_>>().join(", ")),
     })
 }

@@ -33,8 +33,28 @@ pub struct Tree {
     pub warnings: Warnings,
 }
 
-/// Reads a scene file, or `text` in its place. `parameters` override the file's `<default>` values; each must be used.
-pub fn parse(path: &Path, text: Option<&str>, parameters: &[(String, String)], strict: bool) -> Result<Tree> {
+/// The text of a scene file.
+#[derive(Clone, Copy)]
+pub enum Source<'a> {
+    /// In the file itself.
+    File,
+    /// In place of the file's.
+    Text(&'a str),
+    /// Line by line, each of an element that stands somewhere else.
+    Lines(&'a [Line]),
+}
+
+/// A line of XML that was made from something else.
+#[derive(Clone, Debug)]
+pub struct Line {
+    /// Its origin, for messages in place of file and line.
+    pub origin: Arc<Path>,
+    /// The text, without a line break.
+    pub xml: String,
+}
+
+/// Reads a scene file, or a text in its place. `parameters` override the file's `<default>` values; each must be used.
+pub fn parse(path: &Path, source: Source, parameters: &[(String, String)], strict: bool) -> Result<Tree> {
     let tree = Tree {
         objects: Vec::new(),
         ids: HashMap::new(),
@@ -48,18 +68,31 @@ pub fn parse(path: &Path, text: Option<&str>, parameters: &[(String, String)], s
         names: BTreeSet::new(),
         values: HashMap::new(),
         aliases: Vec::new(),
+        references: Vec::new(),
         includes: Vec::new(),
         legacy: false,
     };
-    match text {
-        Some(text) => parser.text(path, text.to_owned(), &mut Parser::top_level)?,
-        None => parser.file(path, &mut Parser::top_level)?,
+    let receive = &mut Parser::top_level;
+    match source {
+        Source::File => parser.file(path, receive)?,
+        Source::Text(text) => parser.text((path, &[]), text.to_owned(), receive)?,
+        Source::Lines(lines) => {
+            let text: Vec<_> = lines.iter().map(|line| line.xml.as_str()).collect();
+            parser.text((path, lines), text.join("\n"), receive)?;
+        }
     }
     for (id, alias, loc) in std::mem::take(&mut parser.aliases) {
         let object = parser.tree.ids.get(&id).cloned();
         let object = object.ok_or_else(|| loc.invalid(format!("alias of the unknown id `{id}`")))?;
         if parser.tree.ids.insert(alias.clone(), object).is_some() {
             return Err(loc.invalid(format!("the id `{alias}` is given twice")));
+        }
+    }
+    for (id, loc) in std::mem::take(&mut parser.references) {
+        let found = parser.tree.ids.get(&id).cloned();
+        let object = found.ok_or_else(|| loc.invalid(format!("nothing has the id `{id}`")))?;
+        if !parser.tree.objects.iter().any(|other| Rc::ptr_eq(other, &object)) {
+            parser.tree.objects.push(object);
         }
     }
     match parameters.iter().find(|(name, _)| !parser.names.contains(name)) {
@@ -77,6 +110,8 @@ pub struct Parser {
     /// Values with an `id`, to be referred to.
     pub values: HashMap<String, Value>,
     aliases: Vec<(String, String, SourceLoc)>,
+    /// References directly under the scene.
+    references: Vec<(String, SourceLoc)>,
     includes: Vec<PathBuf>,
     /// Whether the file that is being read has the names of version 0.6 and before.
     pub legacy: bool,
@@ -87,11 +122,16 @@ pub struct Parser {
 pub struct At<'a> {
     pub element: &'a Element,
     file: &'a Arc<Path>,
+    /// Lines of the text, where they have origins of their own.
+    lines: &'a [Line],
 }
 
 impl<'a> At<'a> {
     pub fn loc(self) -> SourceLoc {
-        SourceLoc { file: Arc::clone(self.file), line: self.element.line }
+        match self.lines.get((self.element.line as usize).saturating_sub(1)) {
+            Some(line) => SourceLoc { file: Arc::clone(&line.origin), line: 0 },
+            None => SourceLoc { file: Arc::clone(self.file), line: self.element.line },
+        }
     }
 
     pub fn tag(self) -> &'a str {
@@ -99,7 +139,7 @@ impl<'a> At<'a> {
     }
 
     pub fn children(self) -> impl Iterator<Item = At<'a>> {
-        self.element.children.iter().map(move |element| At { element, file: self.file })
+        self.element.children.iter().map(move |element| At { element, ..self })
     }
 }
 
@@ -109,13 +149,13 @@ pub type Receiver<'a> = &'a mut dyn FnMut(&mut Parser, At) -> Result<()>;
 impl Parser {
     fn file(&mut self, path: &Path, receive: Receiver) -> Result<()> {
         let bytes = std::fs::read(path).map_err(|error| Error::io(path, error))?;
-        self.text(path, document::decode(&bytes), receive)
+        self.text((path, &[]), document::decode(&bytes), receive)
     }
 
     /// Text that stands in a file, or might. An included file may hold one object in place of a scene.
-    fn text(&mut self, path: &Path, text: String, receive: Receiver) -> Result<()> {
+    fn text(&mut self, (path, lines): (&Path, &[Line]), text: String, receive: Receiver) -> Result<()> {
         let root = document::parse(path, &text)?;
-        let root = At { element: &root, file: &Arc::from(path) };
+        let root = At { element: &root, file: &Arc::from(path), lines };
         let is_scene = root.tag() == "scene";
         if !is_scene && self.includes.is_empty() {
             return Err(root.loc().invalid(format!("a scene file starts with <scene>, not <{}>", root.tag())));
@@ -187,6 +227,7 @@ impl Parser {
             }
             _ => match self.property(at)?.value {
                 Value::Object(object) => self.tree.objects.push(object),
+                Value::Reference(id) => self.references.push((id, at.loc())),
                 // Defined here to be referred to.
                 _ if at.element.attribute("id").is_some() => {}
                 _ => return Err(at.loc().invalid(format!("<{}> is out of place directly under <scene>", at.tag()))),

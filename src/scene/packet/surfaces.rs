@@ -81,6 +81,8 @@ pub struct Surfaces {
     curvature: Lanes,
     /// Indices of the shapes.
     pub shape: Bits,
+    /// Numbers of the instances, as [`Surface`] has them.
+    pub instance: Bits,
     /// Lanes whose surface is emissive; valid where a ray has hit something.
     pub emissive: Mask,
     uv: [Lanes; 2],
@@ -101,6 +103,7 @@ impl Default for Surfaces {
             epsilon: Lanes::ZERO,
             curvature: Lanes::ZERO,
             shape: Bits::ZERO,
+            instance: Bits::ZERO,
             emissive: Mask::NONE,
             uv: [Lanes::ZERO; 2],
             barycentric: [Lanes::ZERO; 2],
@@ -120,6 +123,7 @@ impl Surfaces {
             n: self.n.get(lane),
             frame: self.frame.get(lane),
             at: self.at(lane),
+            instance: self.instance.0[lane],
             dp_du: self.dp_du.get(lane),
             dp_dv: self.dp_dv.get(lane),
             epsilon: self.epsilon.0[lane],
@@ -150,6 +154,7 @@ impl Surfaces {
         self.epsilon.0[lane] = surface.epsilon;
         self.curvature.0[lane] = surface.curvature;
         self.shape.0[lane] = surface.at.shape;
+        self.instance.0[lane] = surface.instance;
         (self.uv[0].0[lane], self.uv[1].0[lane]) = surface.at.uv.into();
         (self.barycentric[0].0[lane], self.barycentric[1].0[lane]) = surface.at.barycentric.into();
         self.primitive.0[lane] = surface.at.primitive;
@@ -172,6 +177,7 @@ impl Surfaces {
         self.epsilon.0[to] = from.epsilon.0[lane];
         self.curvature.0[to] = from.curvature.0[lane];
         self.shape.0[to] = from.shape.0[lane];
+        self.instance.0[to] = from.instance.0[lane];
         self.primitive.0[to] = from.primitive.0[lane];
         for k in 0..2 {
             self.uv[k].0[to] = from.uv[k].0[lane];
@@ -324,6 +330,7 @@ vectorized! {
         surfaces.epsilon = epsilon(surfaces.p, scene_size);
         surfaces.curvature = Lanes::ZERO;
         surfaces.shape = Bits(hits.geometry);
+    surfaces.instance = Bits([u32::MAX; LANES]);
         surfaces.barycentric = [u, v];
         surfaces.primitive = Bits(hits.primitive);
         left

@@ -3,6 +3,7 @@
 use std::fmt;
 
 use crate::error::{Error, Result};
+use crate::image::io::DataWindow;
 use crate::math::{Vec2, vec2};
 use crate::scene::load::Loader;
 use crate::scene::load::props::Object;
@@ -18,6 +19,19 @@ pub struct Crop {
     pub width: usize,
     /// Number of rows.
     pub height: usize,
+}
+
+impl Crop {
+    /// Columns and rows of its pixels, row by row.
+    pub fn pixels(self) -> impl Iterator<Item = (usize, usize)> {
+        (self.y..self.y + self.height).flat_map(move |y| (self.x..self.x + self.width).map(move |x| (x, y)))
+    }
+
+    /// Its window in the whole picture, as a part of an image of some size that may be a part of that picture, too.
+    pub fn within(self, window: Option<DataWindow>, size: (usize, usize)) -> DataWindow {
+        let DataWindow { origin: (x, y), full } = window.unwrap_or(DataWindow { origin: (0, 0), full: size });
+        DataWindow { origin: (x + self.x, y + self.y), full }
+    }
 }
 
 impl fmt::Display for Crop {
@@ -39,11 +53,13 @@ pub struct FilmWindow {
     pub extent: Vec2,
     /// The window in pixels and the size of the full film, where it is a part of it.
     pub part: Option<(Crop, (usize, usize))>,
+    /// The part of the window that is wanted, in its pixels, where more is rendered.
+    pub inner: Option<Crop>,
 }
 
 impl Default for FilmWindow {
     fn default() -> Self {
-        Self { size: (768, 576), alpha: false, origin: Vec2::ZERO, extent: Vec2::ONE, part: None }
+        Self { size: (768, 576), alpha: false, origin: Vec2::ZERO, extent: Vec2::ONE, part: None, inner: None }
     }
 }
 
@@ -120,6 +136,16 @@ impl FilmWindow {
         }
         loader.warn_unused(object)?;
         Ok(Self { alpha: format.ends_with('a') && format != "multichannel", ..window })
+    }
+
+    /// The window with up to so many pixels more on every side, as far as the full film goes.
+    pub fn with_overscan(self, pixels: usize) -> Result<Self> {
+        let Some((crop, full)) = self.part.filter(|_| pixels > 0) else { return Ok(self) };
+        let (x, y) = (crop.x.saturating_sub(pixels), crop.y.saturating_sub(pixels));
+        let end = |at: usize, size: usize, full: usize| (at + size).saturating_add(pixels).min(full);
+        let (right, bottom) = (end(crop.x, crop.width, full.0), end(crop.y, crop.height, full.1));
+        let larger = Self::new(full, Crop { x, y, width: right - x, height: bottom - y })?;
+        Ok(Self { alpha: self.alpha, inner: Some(Crop { x: crop.x - x, y: crop.y - y, ..crop }), ..larger })
     }
 
     /// A point of the window as a point of the full film, both in [0, 1]².

@@ -11,8 +11,8 @@ use crate::image::io::DataWindow;
 use crate::math::lanes::{Lanes, Lanes3};
 use crate::math::{Mat4, Vec2, Vec3, Vec4, vec2, warp};
 use crate::scene::Ray;
-use crate::scene::load::Loader;
 use crate::scene::load::props::Object;
+use crate::scene::load::{self, Loader};
 use crate::scene::packet::Rays;
 
 /// Films with more pixels than this are taken for a mistake.
@@ -111,15 +111,25 @@ pub const PLUGINS: &[(&str, &str)] = &[
     ("orthographic", "to_world, near_clip = 0.01, far_clip = 10000, film, sampler"),
 ];
 
-/// Builds the sensor, with other numbers of pixels or another window of its film.
-pub fn load(object: &Object, loader: &Loader, size: Option<(usize, usize)>, crop: Option<Crop>) -> Result<Sensor> {
+/// Changes of a sensor's film.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct FilmOptions {
+    /// Numbers of pixels of the whole film.
+    pub size: Option<(usize, usize)>,
+    /// The window of it that is rendered.
+    pub crop: Option<Crop>,
+    /// Pixels that are rendered around a window, too.
+    pub overscan: usize,
+}
+
+/// Builds the sensor, with changes of its film.
+pub fn load(object: &Object, loader: &Loader, options: FilmOptions) -> Result<Sensor> {
     let Some((_, parameters)) = PLUGINS.iter().find(|(name, _)| *name == object.plugin) else {
-        let names: Vec<_> = PLUGINS.iter().map(|(name, _)| *name).collect();
-        let what = format!("sensor `{}` is not known; there are {}", object.plugin, names.join(", "));
-        return Err(object.loc.unsupported(what));
+        return Err(load::unknown(object, PLUGINS.iter().map(|(name, _)| *name)));
     };
     let (film, spp) = film_and_spp(object, loader)?;
-    let film = FilmWindow::load(film.as_deref(), loader, size, crop)?;
+    let film = FilmWindow::load(film.as_deref(), loader, options.size, options.crop)?;
+    let film = film.with_overscan(options.overscan)?;
     let (width, height) = film.size;
     let pixels = (width as u64).saturating_mul(height as u64);
     if pixels == 0 || pixels > MAX_PIXELS {
@@ -254,6 +264,11 @@ impl Sensor {
     /// Position of the rendered pixels in the whole film, where they are a part of it.
     pub fn window(&self) -> Option<DataWindow> {
         self.film.part.map(|(crop, full)| DataWindow { origin: (crop.x, crop.y), full })
+    }
+
+    /// The part of the rendered pixels that is wanted, where there are more around it.
+    pub fn inner(&self) -> Option<Crop> {
+        self.film.inner
     }
 
     /// Whether the lens has an extent, so that pixels differ by their positions on it, too.

@@ -74,6 +74,7 @@ impl Cylinder {
             at: Self::texture_point(across, local.z),
             dp_du,
             dp_dv,
+            instance: u32::MAX,
             epsilon: 0.0,
             curvature: self.radius * self.side,
             wi: frame.to_local(-ray.direction),

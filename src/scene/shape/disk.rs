@@ -54,6 +54,7 @@ impl Disk {
             at: Self::texture_point(local),
             dp_du,
             dp_dv,
+            instance: u32::MAX,
             epsilon: 0.0,
             curvature: 0.0,
             wi: frame.to_local(-ray.direction),

@@ -155,6 +155,7 @@ impl Mesh {
             at: self.texture_point(hit.primitive, weights),
             dp_du,
             dp_dv,
+            instance: u32::MAX,
             epsilon: 0.0,
             curvature: 0.0,
             wi: frame.to_local(-ray.direction),

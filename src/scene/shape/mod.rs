@@ -1,6 +1,7 @@
 //! Shapes: triangle meshes and spheres, and the plugins that make them.
 
 mod cube;
+pub mod curves;
 pub mod cylinder;
 pub mod disk;
 mod files;
@@ -11,6 +12,7 @@ mod tessellation;
 
 use std::f32::consts::PI;
 
+pub use self::curves::Curves;
 pub use self::cylinder::Cylinder;
 pub use self::disk::Disk;
 pub use self::mesh::Mesh;
@@ -31,6 +33,8 @@ pub const PLUGINS: &[Plugin<Geometry>] = &[
     sphere::PLUGIN,
     disk::PLUGIN,
     cylinder::PLUGIN,
+    curves::BSPLINE,
+    curves::LINEAR,
 ];
 
 /// An axis-aligned box.
@@ -104,6 +108,8 @@ pub enum Geometry {
     Disk(Disk),
     /// One cylinder without caps.
     Cylinder(Cylinder),
+    /// Round curves.
+    Curves(Curves),
 }
 
 impl Geometry {
@@ -115,6 +121,7 @@ impl Geometry {
             Self::Sphere(sphere) => sphere.surface(hit, ray, derivatives),
             Self::Disk(disk) => disk.surface(hit, ray),
             Self::Cylinder(cylinder) => cylinder.surface(hit, ray),
+            Self::Curves(curves) => curves.surface(hit, ray, derivatives),
         }
     }
 
@@ -125,6 +132,7 @@ impl Geometry {
             Self::Sphere(sphere) => sphere.area(),
             Self::Disk(disk) => disk.area(),
             Self::Cylinder(cylinder) => cylinder.area(),
+            Self::Curves(curves) => curves.area(),
         }
     }
 
@@ -135,6 +143,7 @@ impl Geometry {
             Self::Sphere(sphere) => sphere.bounds(),
             Self::Disk(disk) => disk.bounds(),
             Self::Cylinder(cylinder) => cylinder.bounds(),
+            Self::Curves(curves) => curves.bounds(),
         }
     }
 
@@ -142,17 +151,18 @@ impl Geometry {
     pub fn normals(&self) -> (Vec3, f32) {
         match self {
             Self::Mesh(mesh) => mesh.normals(),
-            Self::Sphere(_) | Self::Disk(_) | Self::Cylinder(_) => (Vec3::Z, PI),
+            Self::Sphere(_) | Self::Disk(_) | Self::Cylinder(_) | Self::Curves(_) => (Vec3::Z, PI),
         }
     }
 
-    /// A point to light `from` with; the emitter's number is left to the caller.
+    /// A point to light `from` with, but for curves, which do not emit; the emitter's number is left to the caller.
     pub fn sample(&self, from: Vec3, u: Vec2) -> Option<LightPoint> {
         match self {
             Self::Mesh(mesh) => mesh.sample(u),
             Self::Sphere(sphere) => sphere.sample(from, u),
             Self::Disk(disk) => Some(disk.sample(u)),
             Self::Cylinder(cylinder) => Some(cylinder.sample(u)),
+            Self::Curves(_) => None,
         }
     }
 
@@ -163,6 +173,7 @@ impl Geometry {
             Self::Sphere(sphere) => sphere.pdf(from, point),
             Self::Disk(disk) => point.area_to_solid_angle(from, 1.0 / disk.area()),
             Self::Cylinder(cylinder) => point.area_to_solid_angle(from, 1.0 / cylinder.area()),
+            Self::Curves(_) => 0.0,
         }
     }
 }

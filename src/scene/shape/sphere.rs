@@ -77,6 +77,7 @@ impl Sphere {
             at: texture::Point { uv: self.uv(outward), ..texture::Point::default() },
             dp_du,
             dp_dv,
+            instance: u32::MAX,
             epsilon: 0.0,
             curvature: self.radius * self.side,
             wi: frame.to_local(-ray.direction),
