@@ -107,6 +107,23 @@ fn the_bound_on_memory_changes_no_bit_or_is_refused() {
 }
 
 #[test]
+fn the_memory_that_an_error_names_is_enough() {
+    for method in reconstruct::METHODS {
+        // Open Image Denoise may not be there.
+        let Ok(made) = parse(method.id) else { continue };
+        for (width, height) in [(16, 16), (70, 150)] {
+            let frame = noisy(width, height, 1.0);
+            let solved = |memory| solve(made.as_ref(), &frame, &Context { memory: Some(memory), ..Context::QUIET });
+            let Err(error) = solved(0) else { continue };
+            let named = error.to_string().rsplit(' ').next().and_then(|word| word.parse::<u64>().ok()).unwrap();
+            if let Err(error) = solved(named << 20) {
+                panic!("{} of {width}x{height} with the {named} MB that it asks for: {error}", method.id);
+            }
+        }
+    }
+}
+
+#[test]
 fn finite_layers_make_finite_images() {
     // Every magnitude next to every other, black pixels, negative ones, and variances that do not fit the values.
     let extreme = |seed: u64, i: usize| {
