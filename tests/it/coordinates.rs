@@ -99,10 +99,8 @@ fn light_that_total_reflection_keeps_in_stays_in() {
     let glass = "<bsdf type=\"dielectric\"/>";
     let ball = format!("<shape type=\"sphere\">{glass}</shape>");
     let small = format!("<shape type=\"sphere\"><float name=\"radius\" value=\"0.1\"/>{glass}</shape>");
-    let flipped = format!(
-        "<shape type=\"sphere\"><boolean name=\"flip_normals\" value=\"true\"/><bsdf type=\"dielectric\">\
-        <float name=\"int_ior\" value=\"1\"/><float name=\"ext_ior\" value=\"1.5046\"/></bsdf></shape>"
-    );
+    let flipped = "<shape type=\"sphere\"><boolean name=\"flip_normals\" value=\"true\"/><bsdf type=\"dielectric\">\
+        <float name=\"int_ior\" value=\"1\"/><float name=\"ext_ior\" value=\"1.5046\"/></bsdf></shape>";
     let instance = format!(
         "<shape type=\"shapegroup\" id=\"g\">{ball}</shape><shape type=\"instance\"><ref id=\"g\"/>\
         <transform name=\"to_world\"><scale value=\"2\"/></transform></shape>"
@@ -112,9 +110,9 @@ fn light_that_total_reflection_keeps_in_stays_in() {
         <point name=\"p1\" x=\"0\" y=\"1e4\" z=\"0\"/>{glass}</shape>"
     );
     for (name, shape, origin, target) in [
-        ("ball", &ball, "0.7,0,0", "0.7,0,-1"),
+        ("ball", ball.as_str(), "0.7,0,0", "0.7,0,-1"),
         ("small ball", &small, "0.07,0,0", "0.07,0,-1"),
-        ("flipped ball", &flipped, "0.7,0,0", "0.7,0,-1"),
+        ("flipped ball", flipped, "0.7,0,0", "0.7,0,-1"),
         ("instance", &instance, "1.4,0,0", "1.4,0,-1"),
         ("rod", &rod, "0.75,0,0", "0.75,0,-1"),
     ] {

@@ -7,7 +7,7 @@ use exr::image::{AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer};
 use exr::meta::attribute::{IntegerBounds, Text};
 use exr::meta::header::{ImageAttributes, LayerAttributes};
 use exr::prelude::WritableImage;
-use fluxion::image::io::read_color;
+use fluxion::image::io::{self, DataWindow, Kind, Pixels, read_color};
 use tempfile::TempDir;
 
 /// Pixels of a side of all images.
@@ -133,4 +133,14 @@ fn faults_are_found_before_the_work_and_named() {
     write(&folder.path().join("bad.exr"), &[("", &rgb(f32::NAN))], false);
     let (done, message) = fluxion(&folder, &["compare", "good.exr", "bad.exr"]);
     assert!(!done && message.contains("bad.exr: R is not finite at pixel 0,0"), "{message}");
+    // Parts of a picture at different places in it.
+    for (name, x) in [("left.exr", 0), ("right.exr", 8)] {
+        let (width, height, channels) = (4, 4, ["R", "G", "B"].map(String::from).to_vec());
+        let window = Some(DataWindow { origin: (x, 0), full: (16, 4) });
+        let pixels = Pixels { width, height, channels, data: vec![1.0; 48], window, ..Pixels::default() };
+        io::write(&folder.path().join(name), &pixels, Kind::Float, None).unwrap();
+    }
+    let (done, message) = fluxion(&folder, &["compare", "left.exr", "right.exr"]);
+    assert!(done && message.contains("left.exr and right.exr are different windows of a picture"), "{message}");
+    assert_eq!(fluxion(&folder, &["compare", "left.exr", "left.exr"]).1, "");
 }

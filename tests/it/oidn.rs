@@ -102,3 +102,20 @@ fn noise_goes_whatever_the_options_and_lamps_stay() {
     }
     assert!(parse("oidn:prefilter=fast").err().unwrap().to_string().contains("accurate or balanced or none"));
 }
+
+#[test]
+fn colour_alone_is_denoised_with_a_warning() {
+    let Ok(method) = parse("oidn") else { return };
+    let truth = image(|x, _| if x < 48 { Rgb::splat(0.4) } else { Rgb::splat(0.8) });
+    let noisy = image(|x, y| truth.rgb(x, y) * (0.5 + rng::unit(rng::mix((y * 96 + x) as u64))));
+    let mut frame = Frame::new(96, 64);
+    frame.set(Layer::Color, noisy.clone());
+    let mse = metrics::find("mse").unwrap();
+    let error = |image: &Image| mse.measure(image, &truth).unwrap().mean;
+    let alone = solve(method.as_ref(), &frame, &Context::QUIET).unwrap().image;
+    assert!(error(&alone) < 0.1 * error(&noisy), "{} of {}", error(&alone), error(&noisy));
+    assert!(method.warnings(&frame)[0].contains("the frame lacks albedo, normal"));
+    frame.set(Layer::Albedo, truth.clone());
+    assert!(method.warnings(&frame)[0].contains("the frame lacks normal:"));
+    solve(method.as_ref(), &frame, &Context::QUIET).unwrap();
+}

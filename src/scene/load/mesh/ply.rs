@@ -138,14 +138,14 @@ pub fn read(bytes: &[u8], path: &Path) -> Result<MeshData> {
     let mut reader = Reader::new(bytes);
     let damaged = |error: ParseError| loc.invalid(format!("not a readable PLY file: {error}"));
     let header = Parser::<Vertex>::new().read_header(&mut reader).map_err(damaged)?;
+    // Every entry takes at least one byte: a larger count is a damaged header.
+    if let Some((name, element)) = header.elements.iter().find(|(_, element)| element.count > bytes.len()) {
+        return Err(loc.invalid(format!("{} entries of `{name}` do not fit in the file", element.count)));
+    }
     let lines = if header.encoding == Encoding::Ascii { by_lines(bytes, &header, &loc)? } else { Vec::new() };
     let mut reader = if header.encoding == Encoding::Ascii { Reader::new(lines.as_slice()) } else { reader };
     let (mut mesh, mut faces) = (MeshData::default(), None);
     for (name, element) in &header.elements {
-        // Every entry takes at least one byte: a larger count is a damaged header.
-        if element.count > bytes.len() {
-            return Err(loc.invalid(format!("{} entries of `{name}` do not fit in the file", element.count)));
-        }
         if name == "vertex" {
             let parser = Parser::<Vertex>::new();
             let vertices = parser.read_payload_for_element(&mut reader, element, &header).map_err(damaged)?;
