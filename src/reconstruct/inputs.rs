@@ -17,6 +17,9 @@ pub const FLOOR: f32 = 0.5;
 /// Largest number of samples of a pixel that networks were trained with.
 pub const TRAINED_SAMPLES: f32 = 64.0;
 
+/// Bytes that `net` holds for every pixel besides the frame, an upper bound; methods that call it count them.
+pub const NET_BYTES: u64 = 1150;
+
 /// Least typical luminance: the square of one over it is still a float.
 const LEAST_LUMINANCE: f32 = 1e-18;
 

@@ -17,7 +17,7 @@ mod network;
 
 use self::features::Evidence;
 use self::network::Network;
-use super::inputs::{Inputs, check_memory};
+use super::inputs::{Inputs, NET_BYTES, check_memory};
 use super::{Context, EdgeTrust, Method, Note, Parameter, Parameters, Reconstruction, Solution, Traits, parse};
 use crate::error::{Error, Result};
 use crate::film::{Frame, Layer, Needs};
@@ -44,12 +44,12 @@ pub const METHOD: Method = Method {
     make,
 };
 
-/// Bytes held for every pixel besides the frame while images are mixed, an upper bound.
-const BYTES: u64 = 1150;
-
-/// The same while a method works: of its intermediate images, and of every finished candidate.
+/// Bytes held for every pixel besides the frame while a method works: of its intermediate images, and of every finished candidate.
 const NOTES: u64 = 80;
 const CANDIDATE: u64 = 12;
+
+/// An upper bound of all, which `net` takes most of; less is held while images are mixed.
+const BYTES: u64 = NET_BYTES + NOTES + 5 * CANDIDATE;
 
 /// Methods, and those of their intermediate images that are candidates beside their own.
 type Candidates = &'static [(&'static str, &'static [&'static str])];

@@ -9,7 +9,7 @@ use crate::image::nl_means::rdfc::{self, Denoised};
 use crate::image::nl_means::{Guide, Guides};
 use crate::image::oidn::{self, Features, Quality};
 use crate::reconstruct::features::Feature;
-use crate::reconstruct::inputs::Inputs;
+use crate::reconstruct::inputs::{Inputs, NET_BYTES};
 use crate::reconstruct::oidn::clean;
 use crate::reconstruct::residual::{noise, squared_error};
 use crate::reconstruct::{Context, parse};
@@ -35,6 +35,14 @@ impl std::str::FromStr for Denoiser {
             "net" => Ok(Self::Net),
             _ => Ok(Self::Rdfc),
         }
+    }
+}
+
+impl Denoiser {
+    /// Bytes that it needs besides the frame, if it cannot do with any.
+    pub fn bytes(self, frame: &Frame) -> u64 {
+        let pixels = (frame.width * frame.height) as u64;
+        if matches!(self, Self::Net) { NET_BYTES * pixels } else { 0 }
     }
 }
 

@@ -137,14 +137,14 @@ impl Reconstruction for Frgr {
     fn reconstruct(&self, frame: &Frame, context: &Context) -> Result<Solution> {
         (context.progress)("clean", 0.0);
         let inputs = Inputs::new(frame, 1 << (self.levels - 1))?;
-        let rows = rows(&inputs, context.memory)?;
+        let held = HELD_FLOATS * 4 * (inputs.width * inputs.height) as u64;
+        let rows = rows(&inputs, context.memory, held + self.denoiser.bytes(frame))?;
         let mut notes = Notes { wanted: context.notes, size: (frame.width, frame.height), notes: Vec::new() };
         let level = self.prepare(&inputs, frame)?;
         notes.add("dx", &level.gradients[0], inputs.scale);
         notes.add("dy", &level.gradients[1], inputs.scale);
         (context.progress)("denoise", 0.1);
         let report = |_: &str, share: f32| (context.progress)("denoise", 0.1 + 0.35 * share);
-        let held = HELD_FLOATS * 4 * (inputs.width * inputs.height) as u64;
         let denoised = context.beside(held, |memory| {
             let context = Context { progress: &report, memory, notes: false };
             denoise(self.denoiser, (&level, self.form), (&inputs, frame), rows, &context)
@@ -287,13 +287,13 @@ impl Frgr {
     }
 }
 
-/// Rows that are denoised at a time, within a bound on memory.
-fn rows(inputs: &Inputs, memory: Option<u64>) -> Result<usize> {
+/// Rows that are denoised at a time, within a bound on memory, of which the denoiser takes so many bytes.
+fn rows(inputs: &Inputs, memory: Option<u64>, denoiser: u64) -> Result<usize> {
     let Some(memory) = memory else { return Ok(inputs.height) };
     let (width, height) = (inputs.width as u64, inputs.height as u64);
     let levels = 4 * LEVEL_FLOATS * width * height;
     let row = 4 * BAND_FLOATS * width;
-    let least = levels + row * LEAST_ROWS.min(height);
+    let least = (levels + row * LEAST_ROWS.min(height)).max(denoiser);
     if memory < least {
         return Err(Error::TooLittleMemory { method: METHOD.id, size: (inputs.width, inputs.height), bytes: least });
     }

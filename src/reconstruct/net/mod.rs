@@ -15,7 +15,7 @@ mod features;
 
 use self::features::{DARK, features};
 use super::compressed::{compress, decompress, given};
-use super::inputs::{Inputs, check_memory};
+use super::inputs::{Inputs, NET_BYTES, check_memory};
 use super::residual::{mean, noise, pulled_back, squared_error, trust, windowed};
 use super::{Context, EdgeTrust, Method, Note, Parameter, Parameters, Reconstruction, Solution, Traits, parse};
 use crate::error::{Error, Result};
@@ -59,9 +59,6 @@ const FEW: f32 = 32.0;
 
 /// How often the network halves the image.
 const HALVINGS: usize = 4;
-
-/// Bytes held for every pixel besides the frame, an upper bound.
-const BYTES: u64 = 1150;
 
 struct Net {
     frgr: Box<dyn Reconstruction>,
@@ -142,7 +139,7 @@ impl Reconstruction for Net {
     }
 
     fn reconstruct(&self, frame: &Frame, context: &Context) -> Result<Solution> {
-        check_memory(frame, context, METHOD.id, BYTES)?;
+        check_memory(frame, context, METHOD.id, NET_BYTES)?;
         let inputs = Inputs::new(frame, self.network.multiple())?;
         let report = |what: &str, done: f32| (context.progress)(what, 0.7 * done);
         let solution =
