@@ -37,7 +37,7 @@ def load_dict(scene: Mapping[str, Any], **keywords: Any) -> Scene:
     the scene by its key or `id`. Images are arrays of height, width and channels, or Mitsuba's bitmaps, as `bitmap` or `data` of a
     texture or an environment: those of integers are display-encoded unless `raw` is true. Meshes are arrays: `{"type": "mesh",
     "vertex_positions": n x 3, "faces": m x 3}`, with `vertex_normals` and `vertex_texcoords` if there are any; or have a method
-    `write_ply`. Files are looked for in the current folder.
+    `write_ply`, as those of Mitsuba, and then the default material. Files are looked for in the current folder.
     """
     if not isinstance(scene, Mapping) or scene.get("type") != "scene":
         raise FluxionError('a scene is a dictionary with "type": "scene"')
@@ -67,6 +67,8 @@ class _Writer:
         if isinstance(value, Mapping):
             self.nested(key, value, at, parent)
         elif hasattr(value, "write_ply"):
+            if getattr(value, "is_emitter", lambda: False)():
+                raise FluxionError(f'{at}: an emissive mesh: give its arrays as {{"type": "mesh"}}, with the emitter in it')
             path = self.file("ply")
             value.write_ply(str(path))
             self.put(at, "shape", {"type": "ply", **_id(key, {}, parent)}, closed=False)
@@ -121,7 +123,7 @@ class _Writer:
 
     def object(self, key: str, value: dict[str, Any], at: str, parent: str) -> None:
         """An object with everything in it, its arrays in files."""
-        plugin = value.pop("type")
+        plugin = value.pop("type").lower()
         if plugin == "mesh":
             plugin, value = "ply", self.mesh(value, at)
         for name in ("bitmap", "data"):
@@ -202,6 +204,6 @@ def _spectrum(value: Any, at: str) -> str:
     if isinstance(value, str):
         return value
     numbers = _numbers(value, at)
-    if numbers.ndim == 2 and numbers.shape[1] == 2:
-        return ", ".join(f"{wavelength}:{number}" for wavelength, number in numbers.tolist())
+    if np.ndim(value) == 2:
+        return ", ".join(f"{wavelength}:{number}" for wavelength, number in numbers.reshape(-1, 2).tolist())
     return " ".join(repr(number) for number in np.atleast_1d(numbers).tolist())

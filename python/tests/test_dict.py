@@ -119,6 +119,18 @@ def test_mistakes_are_named_by_their_keys(change, message):
     assert message in str(raised.value)
 
 
+def test_types_in_capitals_dollars_and_single_pairs_are_read(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    fluxion.write_image("a$b.exr", np.full((2, 2, 3), 0.5, dtype=np.float32))
+    radiance = {"type": "Bitmap", "filename": "a$b.exr"}
+    lamp = {**SQUARE, "light": {"type": "area", "radiance": radiance}, "paint": {"type": "Diffuse"}}
+    sky = {"type": "constant", "radiance": {"type": "spectrum", "value": [(550, 0.3)]}}
+    close = sensor(to_world=look_at((0, 0, 2), (0, 0, 0)), fov=20)
+    found = image(fluxion.load_dict({"type": "scene", "sensor": close, "lamp": lamp}), spp=1)
+    assert np.allclose(found, 0.5, rtol=1e-2)
+    fluxion.load_dict({"type": "scene", "sensor": close, "sky": sky})
+
+
 def test_only_scenes_are_taken():
     with pytest.raises(fluxion.FluxionError, match="type"):
         fluxion.load_dict({"type": "sphere"})

@@ -30,7 +30,7 @@ const NAMES: &[(Layer, &[&str])] = &[
 ];
 
 /// Names of the picture itself, the best first.
-pub const BEAUTY: [&str; 6] = ["noisy image", "combined", "beauty", "rgba", "rgb_imagepipeline", "ci"];
+pub const BEAUTY: [&str; 7] = ["noisy image", "combined", "beauty", "rgba", "rgb_imagepipeline", "ci", "c"];
 
 /// Components of a channel group, in order.
 const COMPONENTS: [&[&str]; 3] = [&["r", "g", "b"], &["x", "y", "z"], &["t"]];

@@ -88,7 +88,8 @@ fn one_view(path: &Path, pixels: Pixels, wanted: Option<&str>) -> Result<(Pixels
             return Err(Error::Usage(what));
         }
     };
-    let warning = wanted.is_none().then(|| {
+    let is_choice = wanted.is_none() && views[1..].iter().any(|view| !views::is_composite(view));
+    let warning = is_choice.then(|| {
         format!("{} has the view layers {}: `{chosen}` is taken; choose with --view-layer", path.display(), names())
     });
     Ok((views::only(pixels, &views, &chosen), warning))

@@ -3,7 +3,15 @@
 use super::aovs::BEAUTY;
 use crate::image::io::Pixels;
 
-/// Names of the view layers, in the order of the file.
+/// Name of Blender's picture of all view layers after its compositor, which has no other layers.
+const COMPOSITE: &str = "composite";
+
+/// Whether a view is what a compositor has made of the others.
+pub fn is_composite(view: &str) -> bool {
+    view.eq_ignore_ascii_case(COMPOSITE)
+}
+
+/// Names of the view layers, in the order of the file; a composite comes last.
 pub fn names(channels: &[String]) -> Vec<String> {
     let mut found: Vec<String> = Vec::new();
     for name in channels {
@@ -14,6 +22,7 @@ pub fn names(channels: &[String]) -> Vec<String> {
             found.push(view.to_owned());
         }
     }
+    found.sort_by_key(|view| is_composite(view));
     found
 }
 

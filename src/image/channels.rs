@@ -63,7 +63,7 @@ const FROM_XYZ: [Rgb; 3] = [
 ];
 
 /// Names of the layer that is the picture.
-const BEAUTY: &[&str] = &["combined", "beauty", "rgba"];
+const BEAUTY: &[&str] = &["combined", "beauty", "rgba", "c"];
 
 /// Names of a single channel of luminance.
 const GREY: &[&str] = &["y", "l", "i", "grey", "gray", "luminance"];
@@ -164,8 +164,15 @@ fn choose(channels: &[String]) -> Option<([usize; 3], bool)> {
         (None, _, [layer]) if parts.iter().all(|(other, _)| other == layer) => of_layer(layer),
         // Of several layers the picture itself, as Blender and compositors name it, or the only one with colours.
         (None, _, layers) => {
-            let beauty = |layer: &&&str| BEAUTY.contains(&layer.rsplit('.').next().unwrap_or_default());
-            let named: Vec<_> = layers.iter().filter(beauty).filter_map(|layer| of_layer(layer)).collect();
+            let of_name = |name: &&str| -> Vec<_> {
+                let named = || layers.iter().filter(|layer| layer.rsplit('.').next() == Some(name));
+                // What a compositor has made of the others counts where there are no others.
+                let composed = |layer: &&&&str| layer.starts_with("composite.");
+                let rendered: Vec<_> = named().filter(|layer| !composed(&layer)).collect();
+                let chosen = if rendered.is_empty() { named().collect() } else { rendered };
+                chosen.into_iter().filter_map(|layer| of_layer(layer)).collect()
+            };
+            let named = BEAUTY.iter().map(of_name).find(|found| !found.is_empty()).unwrap_or_default();
             let colored = layers.iter().filter_map(|layer| of_layer(layer)).filter(|(order, _)| order[0] != order[1]);
             let colored: Vec<_> = colored.filter(|(_, is_xyz)| !is_xyz).collect();
             match (named.as_slice(), colored.as_slice()) {

@@ -28,6 +28,8 @@ pub struct Accel {
 struct Placement {
     to_world: Mat4,
     to_group: Mat4,
+    /// Factor of lengths; zero if it is not the same along all axes.
+    scale: f32,
     /// Number of the group's first shape.
     first_shape: u32,
 }
@@ -50,7 +52,7 @@ impl Accel {
             for &to_world in &group.placements {
                 builder.add_instance(&child, to_world.to_cols_array())?;
                 bounds = bounds.union(extent.transformed(to_world));
-                placements.push(Placement { to_world, to_group: to_world.inverse(), first_shape });
+                placements.push(Placement::new(to_world, first_shape));
             }
             first_shape += group.shapes.len() as u32;
         }
@@ -177,6 +179,12 @@ fn shape_surface(shapes: &[Shape], number: u32, hit: &Hit, ray: Ray) -> Surface 
 }
 
 impl Placement {
+    fn new(to_world: Mat4, first_shape: u32) -> Self {
+        let [x, y, z] = [to_world.x_axis, to_world.y_axis, to_world.z_axis].map(|axis| axis.truncate().length());
+        let is_even = (y - x).abs().max((z - x).abs()) < 1e-3 * x;
+        Self { to_world, to_group: to_world.inverse(), scale: if is_even { x } else { 0.0 }, first_shape }
+    }
+
     /// The hit is found in the group's own coordinates, along an unnormalised ray so that distances stay the same. Kept
     /// apart from the common case, which is inlined.
     #[inline(never)]
@@ -197,7 +205,7 @@ impl Placement {
             frame,
             dp_du: self.to_world.transform_vector3(local.dp_du),
             dp_dv: self.to_world.transform_vector3(local.dp_dv),
-            curvature: local.curvature * self.to_world.x_axis.truncate().length(),
+            curvature: local.curvature * self.scale,
             wi: frame.to_local(-ray.direction),
             ..local
         }

@@ -2,7 +2,6 @@
 
 use std::path::{Path, PathBuf};
 
-use assert_cmd::Command;
 use exr::image::{AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer};
 use exr::meta::attribute::{IntegerBounds, Text};
 use exr::meta::header::{ImageAttributes, LayerAttributes};
@@ -37,7 +36,7 @@ fn write(path: &Path, parts: &[Part], noisy: bool) {
 }
 
 fn fluxion(folder: &TempDir, arguments: &[&str]) -> (bool, String) {
-    let output = Command::cargo_bin("fluxion").unwrap().current_dir(folder.path()).args(arguments).output().unwrap();
+    let output = crate::cli::fluxion(folder.path()).args(arguments).output().unwrap();
     (output.status.success(), String::from_utf8_lossy(&output.stderr).into_owned())
 }
 
@@ -107,6 +106,14 @@ fn of_several_view_layers_the_first_or_the_one_asked_for_is_taken() {
     let (done, message) = run(&["--view-layer", "front"]);
     assert!(done && message.is_empty(), "{message}");
     assert_eq!(mean(folder.path().join("r.exr")), [1.0; 3]);
+    // A compositor's picture is no view layer of its own.
+    let channels = [view("Composite", 9.0), view("Scene", 3.0)].concat();
+    let channels: Vec<_> = channels.iter().map(|(name, value)| (name.as_str(), *value)).collect();
+    write(&folder.path().join("c.exr"), &[("", &channels)], false);
+    let command = ["reconstruct", "c.exr", "-o", "r.exr", "--method", "primal", "--spp", "4"];
+    assert_eq!(fluxion(&folder, &command), (true, String::new()));
+    assert_eq!(mean(folder.path().join("r.exr")), [3.0; 3]);
+    assert_eq!(mean(folder.path().join("c.exr")), [3.0; 3]);
     let (done, message) = run(&["--view-layer", "side"]);
     assert!(!done && message.contains("no view layer `side`; it has back, front"), "{message}");
     assert!(read_color(&folder.path().join("a.exr")).is_err());

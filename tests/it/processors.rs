@@ -2,10 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use assert_cmd::Command;
 use fluxion::image::Image;
 use fluxion::image::io::read_color;
 
+use crate::cli::fluxion;
 use crate::common::root;
 
 /// Scene files of all bundled scenes.
@@ -20,7 +20,7 @@ fn scenes() -> Vec<PathBuf> {
 fn image(scene: &Path, embree: &str, lanes: &str) -> Image {
     let folder = tempfile::tempdir().unwrap();
     let output = folder.path().join("a.exr");
-    let mut command = Command::cargo_bin("fluxion").unwrap();
+    let mut command = fluxion(folder.path());
     command.arg("render").arg(scene).arg("-o").arg(&output).env("FLUXION_EMBREE", embree);
     command.args(["--size", "19x15", "--spp", "2", "--method", "l2", "--threads", "1", "--quiet"]);
     if !lanes.is_empty() {
@@ -54,7 +54,7 @@ fn every_processor_renders_the_same() {
 
 #[test]
 fn a_processor_that_is_not_known_is_an_error() {
-    let mut command = Command::cargo_bin("fluxion").unwrap();
+    let mut command = fluxion(&root());
     let failed = command.args(["info", "--methods"]).env("FLUXION_LANES", "sse9").assert().failure().code(1);
     let message = String::from_utf8_lossy(&failed.get_output().stderr).into_owned();
     assert!(message.contains("FLUXION_LANES=sse9 is not known; there are baseline, avx2, avx512"), "{message}");

@@ -597,6 +597,7 @@ fn ascii_meshes_are_words_between_white_space() {
         "3.0.0",
         "<shape type=\"ply\"><string name=\"filename\" value=\"m.ply\"/></shape><emitter type=\"constant\"/>",
     );
+    let header = header.replace("ascii 1.0", "ascii 1.0\ncomment before end_header there are more lines");
     let load = |body: &str| {
         let mesh = format!("{header}{body}");
         scene_of(&[("scene.xml", scene.as_bytes()), ("m.ply", mesh.as_bytes())], &load::Options::default())
@@ -652,7 +653,7 @@ fn weights_of_emitters_change_the_noise_and_not_the_mean() {
         all.iter().map(|pixel| pixel[0]).sum::<f32>() / all.len() as f32
     };
     let expected = mean(&lit(["1", "1"]));
-    for weights in [["1", "9"], ["0", "1"], ["0", "0"]] {
+    for weights in [["1", "9"], ["0", "1"], ["0", "0"], ["3e38", "2e38"]] {
         let found = mean(&lit(weights));
         assert!((found / expected - 1.0).abs() < 0.03, "{weights:?}: {found}, not {expected}");
     }

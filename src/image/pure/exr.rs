@@ -8,6 +8,7 @@ use std::path::Path;
 use exr::image::write::WritableImage;
 use exr::image::{AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer};
 use exr::meta::MetaData;
+
 use exr::meta::attribute::{AttributeValue, IntegerBounds, SampleType};
 use exr::meta::header::LayerAttributes;
 use exr::prelude::{Blocks, Compression, LineOrder, ReadChannels, ReadLayers, f16, read};
@@ -36,6 +37,12 @@ struct Exr {
 pub fn open(path: &Path) -> Result<(Header, Box<dyn Format>)> {
     let found = MetaData::read_from_file(path, false).map_err(|error| Error::io(path, error))?;
     let parts: Vec<_> = found.headers.iter().map(part).collect();
+    if parts.iter().any(|part| part.deep) {
+        return Err(Error::io(path, "files with deep parts take a build with OpenImageIO"));
+    }
+    // All of them are decoded, also those of other sizes.
+    let bytes = std::fs::metadata(path).map_err(|error| Error::io(path, error))?.len() as usize;
+    parts.iter().try_for_each(|part| part.header.check(path, bytes))?;
     let merged = parts::merge(&parts);
     let Merged { header, parts } = merged.ok_or_else(|| Error::io(path, "deep images are not supported"))?;
     let mut strings = HashMap::new();
@@ -89,7 +96,6 @@ impl Format for Exr {
     fn samples(&self, path: &Path) -> Result<Samples> {
         let image = read().no_deep_data().largest_resolution_level().all_channels().all_layers().all_attributes();
         let image = image.from_file(path).map_err(|error| Error::io(path, error))?;
-        // Deep parts are not among the layers of the image.
         let wanted = image.layer_data.into_iter().enumerate().filter(|(i, _)| self.parts.contains(i));
         let layers: Vec<_> = wanted.map(|(_, layer)| layer).collect();
         let count: usize = layers.iter().map(|layer| layer.channel_data.list.len()).sum();
@@ -133,4 +139,30 @@ pub fn write(path: &Path, pixels: &Pixels, kind: Kind, compression: Option<&str>
     let mut image = Image::from_layer(Layer::new(size, attributes, encoding, channels));
     image.attributes.display_window = IntegerBounds::from_dimensions(window.full);
     image.write().to_file(path).map_err(|error| Error::io(path, error))
+}
+
+#[cfg(test)]
+mod tests {
+    use exr::meta::attribute::Text;
+
+    use super::*;
+    use crate::image::pure::ImageFile;
+    use crate::pixels::OpenImage;
+
+    #[test]
+    fn parts_of_one_size_are_read_as_one_image() {
+        let part = |name: &str, width: usize, channel: &str, value: f32| {
+            let samples = FlatSamples::F32(vec![value; 2 * width]);
+            let channels = AnyChannels::sort([AnyChannel::new(channel, samples)].into_iter().collect());
+            Layer::new((width, 2), LayerAttributes::named(Text::from(name)), Encoding::UNCOMPRESSED, channels)
+        };
+        let parts = vec![part("depth", 3, "Z", 7.0), part("small", 1, "Y", 5.0), part("mask", 3, "Y", 2.0)];
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.exr");
+        let attributes = exr::meta::header::ImageAttributes::new(IntegerBounds::from_dimensions((3, 2)));
+        Image::from_layers(attributes, parts).write().to_file(&path).unwrap();
+        let file = ImageFile::open(&path).unwrap();
+        assert_eq!((file.channels.join(" ").as_str(), file.parts), ("depth.Z mask.Y", 3));
+        assert_eq!(file.floats().unwrap(), [7.0, 2.0].repeat(6));
+    }
 }

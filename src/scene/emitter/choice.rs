@@ -21,13 +21,17 @@ impl Choice {
     /// Half of the choices go by power and half are even, so that a weak emitter close by is not starved. `None` when
     /// nothing emits. `factors` are those of the chances of single emitters; one of zero is never chosen.
     pub fn new(emitters: &[Box<dyn Emitter>], factors: &[f32]) -> Option<Self> {
-        let powers: Vec<f32> = emitters.iter().zip(factors).map(|(emitter, factor)| emitter.power() * factor).collect();
+        // Only their ratios count.
+        let most = factors.iter().copied().fold(f32::MIN_POSITIVE, f32::max);
+        let factors: Vec<f32> = factors.iter().map(|factor| factor / most).collect();
+        let powers: Vec<f32> =
+            emitters.iter().zip(&factors).map(|(emitter, factor)| emitter.power() * factor).collect();
         let total: f32 = powers.iter().sum();
-        let lit: f32 = powers.iter().zip(factors).filter(|(power, _)| **power > 0.0).map(|(_, factor)| factor).sum();
+        let lit: f32 = powers.iter().zip(&factors).filter(|(power, _)| **power > 0.0).map(|(_, factor)| factor).sum();
         let share = |(&power, factor): (&f32, &f32)| {
             if power > 0.0 { 0.5 * factor / lit + 0.5 * (power / total) } else { 0.0 }
         };
-        let weights: Vec<_> = powers.iter().zip(factors).map(share).collect();
+        let weights: Vec<_> = powers.iter().zip(&factors).map(share).collect();
         if emitters.len() <= MANY {
             return Some(Self { table: Alias::new(&weights)?, listed: Vec::new(), tree: None });
         }

@@ -222,6 +222,8 @@ fn sampling_weight(object: &Object, loader: &Loader, only_sampled: bool) -> Resu
 fn name(object: &Object) -> Arc<str> {
     match &object.id {
         Some(id) => id.as_str().into(),
+        // Of what was made from something else the place there.
+        None if object.loc.line == 0 => object.loc.to_string().into(),
         None => format!("{}_line_{}", object.plugin, object.loc.line).into(),
     }
 }

@@ -131,6 +131,8 @@ pub fn class_of(plugin: &str) -> Option<&'static str> {
 fn load_tree(path: &Path, parse: &dyn Fn() -> Result<xml::Tree>, options: &Options) -> Result<Scene> {
     let mut scene = build(path, parse()?, options, DVec3::ZERO)?;
     if let Some(origin) = view::near_camera(&scene) {
+        // Its memory is freed before the second one takes as much.
+        drop(scene);
         scene = build(path, parse()?, options, origin)?;
     }
     if let Some(what) = view::clipped(&scene).filter(|_| !scene.sensors.is_empty()) {

@@ -70,6 +70,7 @@ pub fn parse(path: &Path, source: Source, parameters: &[(String, String)], stric
         aliases: Vec::new(),
         references: Vec::new(),
         includes: Vec::new(),
+        literal: matches!(source, Source::Lines(_)),
         legacy: false,
     };
     let receive = &mut Parser::top_level;
@@ -113,6 +114,8 @@ pub struct Parser {
     /// References directly under the scene.
     references: Vec<(String, SourceLoc)>,
     includes: Vec<PathBuf>,
+    /// Whether `$` stands for itself: lines that were made from something else have no parameters.
+    literal: bool,
     /// Whether the file that is being read has the names of version 0.6 and before.
     pub legacy: bool,
 }
@@ -244,7 +247,7 @@ impl Parser {
 
     pub fn optional(&mut self, at: At, name: &str) -> Result<Option<String>> {
         let Some(text) = at.element.attribute(name) else { return Ok(None) };
-        if !text.contains('$') {
+        if self.literal || !text.contains('$') {
             return Ok(Some(text.to_owned()));
         }
         let mut result = String::new();

@@ -140,6 +140,10 @@ impl FilmWindow {
 
     /// The window with up to so many pixels more on every side, as far as the full film goes.
     pub fn with_overscan(self, pixels: usize) -> Result<Self> {
+        if pixels > 0 && self.part.is_none() && self.extent != Vec2::ONE {
+            let what = "overscan around the file's own part of the film in other numbers of pixels: give --crop";
+            return Err(Error::Usage(what.into()));
+        }
         let Some((crop, full)) = self.part.filter(|_| pixels > 0) else { return Ok(self) };
         let (x, y) = (crop.x.saturating_sub(pixels), crop.y.saturating_sub(pixels));
         let end = |at: usize, size: usize, full: usize| (at + size).saturating_add(pixels).min(full);

@@ -165,8 +165,14 @@ pub fn read(bytes: &[u8], path: &Path) -> Result<MeshData> {
 
 /// The entries of an ASCII file, each on a line of its own: they are words between white space, however that is made up.
 fn by_lines(bytes: &[u8], header: &Header, loc: &SourceLoc) -> Result<Vec<u8>> {
-    const END: &[u8] = b"end_header";
-    let start = bytes.windows(END.len()).position(|window| window == END).map_or(bytes.len(), |at| at + END.len());
+    // The line that ends the header: comments may hold the word, too.
+    let mut start = 0;
+    for line in bytes.split_inclusive(|byte| matches!(byte, b'\n' | b'\r')) {
+        start += line.len();
+        if line.trim_ascii() == b"end_header" {
+            break;
+        }
+    }
     let mut words = bytes[start..].split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
     let mut lines = Vec::with_capacity(bytes.len());
     for (name, element) in &header.elements {
