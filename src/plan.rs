@@ -1,7 +1,7 @@
 //! The plan: what a scene and a method need, and so what is left out. Decided once, before rendering, with the reasons.
 
 use crate::error::{Error, Result};
-use crate::film::{EdgeNeed, Needs};
+use crate::film::{Asker, EdgeNeed, Needs, RECORDED, Recorded, RecordedInfo};
 use crate::neighbours::Selector;
 use crate::reconstruct::{self, METHODS, Method, Reconstruction};
 use crate::scene::Scene;
@@ -32,13 +32,13 @@ impl Plan {
         let wanted = method.union(saved);
         let edges = match scatters_light(scene) {
             // Known at no cost, whether or not the method asks; those of the ambient light have to be sampled.
-            Err(_) if !wanted.ambient => EdgeNeed::KnownZero,
+            Err(_) if !wanted.has(Recorded::Ambient) => EdgeNeed::KnownZero,
             // Bins of edges go with those of colours where every sample has both.
-            _ if wanted.bins => wanted.with_every_difference().edges,
+            _ if wanted.has(Recorded::Bins) => wanted.with_every_difference().edges,
             _ => wanted.edges,
         };
         let lights = scene.light_groups().count() as u8;
-        let needs = Needs { edges, alpha: scene.sensor().wants_alpha(), lights, ..wanted };
+        let needs = Needs { edges, lights, ..wanted }.with_if(Recorded::Alpha, scene.sensor().wants_alpha());
         let mut items = of_film(scene, method, saved, needs);
         items.extend(of_scene(scene, needs));
         Self { needs, items }
@@ -124,28 +124,24 @@ fn of_film(scene: &Scene, method: Needs, saved: Needs, needs: Needs) -> Vec<Item
     if let (true, false, Err(reason)) = (wanted, needs.edges.is_sampled(), scatters_light(scene)) {
         gradients.reason = reason.to_owned();
     }
-    vec![
-        gradients,
-        item("features", needs.features, method.features, saved.features),
-        item("bins", needs.bins, method.bins, saved.bins),
-        item("occlusion", needs.occlusion, method.occlusion, saved.occlusion),
-        item("position", needs.position, method.position, saved.position),
-        item("ambient", needs.ambient, method.ambient, saved.ambient),
-        Item {
-            name: "alpha",
-            computed: needs.alpha,
-            reason: if needs.alpha { "the film's pixel_format has alpha" } else { "the film's pixel_format has none" }
-                .into(),
+    let of_row = |row: &RecordedInfo| match row.asker {
+        Asker::Film(why, why_not) => {
+            let computed = needs.has(row.id);
+            Item { name: row.name, computed, reason: if computed { why } else { why_not }.to_owned() }
+        }
+        _ => item(row.name, needs.has(row.id), method.has(row.id), saved.has(row.id)),
+    };
+    let mut items = vec![gradients];
+    items.extend(RECORDED.iter().map(of_row));
+    items.push(Item {
+        name: "lights",
+        computed: needs.lights > 0,
+        reason: match needs.lights {
+            0 => "no light group is asked for".into(),
+            count => format!("{count} light groups are recorded by themselves"),
         },
-        Item {
-            name: "lights",
-            computed: needs.lights > 0,
-            reason: match needs.lights {
-                0 => "no light group is asked for".into(),
-                count => format!("{count} light groups are recorded by themselves"),
-            },
-        },
-    ]
+    });
+    items
 }
 
 /// Decisions about the tracing of paths.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use fluxion::adaptive::{self, AdaptiveSettings, Allocator, Limits};
-use fluxion::film::{Needs, Provenance};
+use fluxion::film::{Needs, Provenance, Recorded};
 use fluxion::neighbours::Selector;
 use fluxion::plan::{self, Plan};
 use fluxion::reconstruct::{self, Reconstruction};
@@ -182,7 +182,7 @@ pub fn render(
     let limits = limits.or_samples(scene.sensor().spp);
     let kernel = plan::kernel(selector, reconstruction.as_ref(), limits.spp).map_err(raised)?;
     let needed = reconstruction.needs().union(kernel.needs());
-    let saved = Needs { features: layers, bins, occlusion, position, ambient, ..Needs::default() };
+    let saved = Needs::NONE.with_if(Recorded::Features, layers).with_if(Recorded::Bins, ).with_if(Recorded::Occlusion, ).with_if(Recorded::Position, ).with_if(Recorded::Ambient, );
     let plan = Plan::new(&scene, needed, saved).with_kernel(&kernel);
     let budget = limits.time.map_or(Budget::Spp(limits.spp.unwrap_or(1)), Budget::Time);
     let settings = RenderSettings { budget, seed, first, needs: plan.needs, shift, kernel };

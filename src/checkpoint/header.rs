@@ -1,4 +1,4 @@
-//! The part of a checkpoint's file before its tiles, and the sum of all bytes behind them. All numbers are little-endian:
+//! The part of a checkpoint's file before its tiles, and the checksum behind them. All numbers are little-endian:
 //!
 //! | bytes | content |
 //! |---|---|
@@ -24,17 +24,15 @@ use super::Origin;
 use crate::adaptive::Notes;
 use crate::error::{Error, Result};
 use crate::files;
-use crate::film::{EdgeNeed, Kernel, Needs, Neighbours, Rejected, STEPS, StepWeights, Tile};
+use crate::film::{EdgeNeed, Kernel, NEWEST, Needs, Neighbours, Rejected, STEPS, StepWeights, Tile};
 use crate::render::SampleId;
 
 const MAGIC: [u8; 8] = *b"FLUXCKPT";
 
-/// Version of the format: raised whenever the bytes change their meaning.
-const VERSION: u32 = 5;
+/// Version of the format, which every new statistic raises.
+const VERSION: u32 = NEWEST;
 /// The oldest version that is read.
 const OLDEST: u32 = 2;
-/// Versions whose films have fewer statistics, without alpha and without lights: the latest of each, with their number.
-const FEWER: [(u32, usize); 2] = [(2, 10), (4, 11)];
 
 /// Headers longer than this are damaged.
 const MAX_HEADER: u32 = 1 << 24;
@@ -93,7 +91,7 @@ impl Header {
         Self { origin, seconds, rejected: rejected.map(|(id, reason)| (id, reason.0.to_owned())), adaptive, kernel }
     }
 
-    /// The first sample that was not finite. Reasons are for the user's eyes: one that this version would not give is still one.
+    /// The first sample that was not finite. Unknown reasons are kept for display.
     pub fn rejected(&self) -> Option<(SampleId, Rejected)> {
         self.rejected.as_ref().map(|(id, reason)| (*id, Rejected::named(reason)))
     }
@@ -107,14 +105,14 @@ impl Header {
     }
 }
 
-/// A stream whose bytes are counted and summed up on the way.
-pub struct Summed<T> {
+/// A stream whose bytes are counted and whose checksum is computed on the way.
+pub struct Checksummed<T> {
     inner: T,
     sum: Hasher,
     count: u64,
 }
 
-impl<T> Summed<T> {
+impl<T> Checksummed<T> {
     fn new(inner: T) -> Self {
         Self { inner, sum: Hasher::new(), count: 0 }
     }
@@ -125,7 +123,7 @@ impl<T> Summed<T> {
     }
 }
 
-impl<T: Write> Write for Summed<T> {
+impl<T: Write> Write for Checksummed<T> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         let count = self.inner.write(bytes)?;
         self.add(&bytes[..count]);
@@ -137,7 +135,7 @@ impl<T: Write> Write for Summed<T> {
     }
 }
 
-impl<T: Read> Read for Summed<T> {
+impl<T: Read> Read for Checksummed<T> {
     fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
         let count = self.inner.read(bytes)?;
         self.add(&bytes[..count]);
@@ -145,15 +143,15 @@ impl<T: Read> Read for Summed<T> {
     }
 }
 
-/// Writes a file that replaces the one at `path` when it is complete: header, then what `rest` appends, then the sum.
+/// Writes a file that replaces the one at `path` when it is complete: header, then what `rest` appends, then the checksum.
 pub fn write(
     path: &Path,
     (header, kernel): (&Header, &Kernel),
-    rest: impl FnOnce(&mut Summed<BufWriter<File>>) -> Result<()>,
+    rest: impl FnOnce(&mut Checksummed<BufWriter<File>>) -> Result<()>,
 ) -> Result<()> {
     files::replace(path, |part| {
         let failed = |error: io::Error| Error::io(part, error);
-        let mut to = Summed::new(BufWriter::with_capacity(1 << 20, File::create(part).map_err(failed)?));
+        let mut to = Checksummed::new(BufWriter::with_capacity(1 << 20, File::create(part).map_err(failed)?));
         start(&mut to, header, kernel).map_err(failed)?;
         rest(&mut to)?;
         let sum = to.sum.clone().finalize();
@@ -184,13 +182,13 @@ const EMPTY: &str = "is empty: whoever was to write it ended before it did";
 /// A checkpoint that is being read: its tiles come one by one.
 pub struct Reader {
     path: PathBuf,
-    from: Summed<BufReader<File>>,
+    from: Checksummed<BufReader<File>>,
     /// Bytes of the file.
     length: u64,
     pub header: Header,
     pub kernel: Kernel,
-    /// Statistics that the film has, if not all that there are now.
-    statistics: Option<usize>,
+    /// Version of the format, which says which statistics the film has.
+    version: u32,
 }
 
 impl Reader {
@@ -202,7 +200,7 @@ impl Reader {
         if length == 0 {
             return Err(Error::io(path, EMPTY));
         }
-        let mut from = Summed::new(BufReader::with_capacity(buffer, file));
+        let mut from = Checksummed::new(BufReader::with_capacity(buffer, file));
         let (header, version) = header(&mut from, length).map_err(failed)?;
         let size = header.origin.size;
         let kernel = match header.kernel {
@@ -215,8 +213,7 @@ impl Reader {
                 Kernel::Chosen(Arc::new(Neighbours::new(size, masks, directed).weighted(weights)))
             }
         };
-        let statistics = FEWER.iter().find(|(latest, _)| version <= *latest).map(|(_, count)| *count);
-        Ok(Self { path: path.to_path_buf(), from, length, header, kernel, statistics })
+        Ok(Self { path: path.to_path_buf(), from, length, header, kernel, version })
     }
 
     /// Name of the file.
@@ -226,7 +223,7 @@ impl Reader {
 
     /// Fills the next of the film's tiles.
     pub fn tile(&mut self, tile: &mut Tile) -> Result<()> {
-        tile.read(self.statistics, &mut self.from).map_err(|error| Error::io(&self.path, explain(error)))
+        tile.read(self.version, &mut self.from).map_err(|error| Error::io(&self.path, explain(error)))
     }
 
     /// Reads so many words.
@@ -234,7 +231,7 @@ impl Reader {
         words(&mut self.from, count).map_err(|error| Error::io(&self.path, explain(error)))
     }
 
-    /// Ends the reading, of what has not been read, too. The error says that the file is damaged.
+    /// Skips the rest of the file and checks the checksum. The error says that the file is damaged.
     pub fn finish(mut self) -> Result<()> {
         let left = (self.length.saturating_sub(size_of::<u32>() as u64)).saturating_sub(self.from.count);
         let mut skipped = self.from.by_ref().take(left);
@@ -305,7 +302,7 @@ fn weights(from: &mut impl Read, pixels: usize) -> io::Result<Vec<StepWeights>> 
         .flat_map(|word| [word as u16, (word >> 16) as u16].map(f16::from_bits))
         .collect();
     if halves.iter().any(|weight| !weight.is_finite() || weight.is_sign_negative()) {
-        return Err(io::Error::new(io::ErrorKind::InvalidData, "a weight is no number from zero on"));
+        return Err(io::Error::new(io::ErrorKind::InvalidData, "a weight is negative or not finite"));
     }
     Ok(halves.chunks_exact(STEPS.len()).map(|of_pixel| std::array::from_fn(|step| of_pixel[step])).collect())
 }

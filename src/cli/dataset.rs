@@ -4,14 +4,15 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::{Context as _, Result, bail};
+use clap::builder::{PossibleValue, PossibleValuesParser};
 use fluxion::dataset::{self, Layout, Number, Recipe};
 use fluxion::error::Error;
-use fluxion::film::{EdgeNeed, Needs};
+use fluxion::film::{EdgeNeed, Needs, RECORDED, Recorded};
 use fluxion::reconstruct;
 use fluxion::scene::load;
 
-use super::progress;
 use super::terminal::out;
+use super::{progress, statistics};
 
 /// Options of `dataset`.
 #[derive(clap::Args)]
@@ -38,8 +39,8 @@ pub struct Args {
     #[arg(long, requires = "methods")]
     notes: bool,
     /// Statistics to store besides the colour
-    #[arg(long, value_delimiter = ',', default_value = "features", value_enum, value_name = "WHAT")]
-    layers: Vec<Part>,
+    #[arg(long, value_delimiter = ',', default_value = Recorded::Features.info().name, value_parser = part_names(), value_name = "WHAT")]
+    layers: Vec<String>,
     /// Arrangement of the files
     #[arg(long, default_value = "npy", value_enum)]
     layout: Arrangement,
@@ -62,21 +63,14 @@ pub struct Args {
     quiet: bool,
 }
 
-/// Statistics that can be stored.
-#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum Part {
-    /// Nothing else.
-    Color,
-    /// Albedo, normal and depth.
-    Features,
-    /// Differences to the neighbouring pixels.
-    Gradients,
-    /// Means of eight groups of samples, whose even and odd ones are independent.
-    Bins,
-    /// Ambient occlusion.
-    Occlusion,
-    /// World position.
-    Position,
+/// Names of what can be stored beside the statistics of the table.
+const COLOR: &str = "color";
+const GRADIENTS: &str = "gradients";
+
+fn part_names() -> PossibleValuesParser {
+    let others = [(COLOR, "nothing else"), (GRADIENTS, "differences to the neighbouring pixels")];
+    let others = others.map(|(name, help)| PossibleValue::new(name).help(help));
+    others.into_iter().chain(statistics::names()).collect::<Vec<_>>().into()
 }
 
 /// Names of the layouts.
@@ -90,7 +84,7 @@ enum Arrangement {
 
 impl Args {
     fn recipe(&self) -> Result<Recipe> {
-        let (mut spp, has) = (self.spp.clone(), |part| self.layers.contains(&part));
+        let (mut spp, has) = (self.spp.clone(), |name: &str| self.layers.iter().any(|part| part == name));
         spp.sort_unstable();
         spp.dedup();
         for method in self.methods.iter().chain([&self.target]) {
@@ -103,21 +97,16 @@ impl Args {
             Arrangement::Npy => Layout::Npy,
             Arrangement::Oidn => Layout::Oidn,
         };
-        if layout == Layout::Oidn && (self.notes || self.layers != [Part::Features]) {
+        if layout == Layout::Oidn && (self.notes || self.layers != [Recorded::Features.info().name]) {
             bail!(Error::Usage("--layout oidn has albedo and normal only: leave --layers and --notes out".into()));
         }
         let columns: Vec<_> = self.methods.iter().map(|method| dataset::column(method)).collect();
         if let Some(k) = repeated(&columns) {
             bail!(Error::Usage(format!("--method {} would have the names of another one's images", self.methods[k])));
         }
-        let layers = Needs {
-            features: has(Part::Features) || layout == Layout::Oidn,
-            edges: if has(Part::Gradients) { EdgeNeed::Sampled } else { EdgeNeed::Off },
-            bins: has(Part::Bins),
-            occlusion: has(Part::Occlusion),
-            position: has(Part::Position),
-            ..Needs::default()
-        };
+        let edges = if has(GRADIENTS) { EdgeNeed::Sampled } else { EdgeNeed::Off };
+        let layers =
+            RECORDED.iter().fold(Needs { edges, ..Needs::NONE }, |needs, row| needs.with_if(row.id, has(row.name)));
         Ok(Recipe {
             spp,
             reference: self.reference,

@@ -18,6 +18,7 @@ mod render;
 mod scene;
 mod schema;
 mod shell;
+mod statistics;
 mod stats;
 mod stored;
 mod stress;

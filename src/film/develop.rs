@@ -3,7 +3,8 @@
 use rayon::prelude::*;
 
 use super::source::{Axis, Source};
-use super::statistic::{Record, Statistic};
+use super::statistic::Statistic;
+use super::statistics::Record;
 use super::{BINS, Edges, Film, Frame, Kernel, Layer, Tile};
 use crate::image::Image;
 

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::statistic::Record;
+use super::statistics::Record;
 use super::{BINS, Edges, Film, Neighbours, STEPS, Tile, opposite};
 use crate::math::{Rgb, vec3};
 

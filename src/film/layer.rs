@@ -103,7 +103,7 @@ const fn info(
 const SINGLE: [(Layer, Info); 23] = {
     use self::Layer as L;
     use self::Source::{EdgeMean, EdgeSampleCount, EdgeVariance, Mean, RejectedCount, SampleCount, Variance};
-    use super::statistic::Record::{Alpha, Color, Direct, Edges, Occlusion, Position, Surface};
+    use super::statistics::Record::{Alpha, Color, Direct, Edges, Occlusion, Position, Surface};
     const RADIANCE: [&str; 3] = ["radiance", ">= 0", "always"];
     const RADIANCE_VARIANCE: [&str; 3] = ["radiance²", ">= 0", "always"];
     const DIFFERENCE: [&str; 3] = ["radiance", "any", "--method l2"];
@@ -278,7 +278,7 @@ const SINGLE: [(Layer, Info); 23] = {
 /// Layers that every bin has.
 const BINNED: [Info; 6] = {
     use self::Source::{Bin, EdgeBin};
-    use super::statistic::Record::{AmbientBins, AmbientEdgeBins, ColorBins, EdgeBins};
+    use super::statistics::Record::{AmbientBins, AmbientEdgeBins, ColorBins, EdgeBins};
     const DIFFERENCE: [&str; 3] = ["radiance", "any", "--bins"];
     const AMBIENT_DIFFERENCE: [&str; 3] = ["1", "any", "--ambient"];
     [

@@ -1,6 +1,6 @@
 //! Light of groups of emitters as images, by themselves and in files.
 
-use super::statistic::{LIGHT, Record};
+use super::statistics::{LIGHT, Record};
 use super::{Film, Tile};
 use crate::image::Image;
 

@@ -20,6 +20,7 @@ mod provenance;
 mod sample;
 mod source;
 mod statistic;
+mod statistics;
 mod stored;
 mod tile;
 mod views;
@@ -28,11 +29,12 @@ pub use self::edges::{Cross, EdgeParts, Edges, HalfEdge};
 pub use self::frame::{Frame, half};
 pub use self::layer::Layer;
 pub use self::light_layers::LightLayers;
-pub use self::needs::{EdgeNeed, Needs};
+pub use self::needs::{EdgeNeed, Needs, RecordedSet};
 pub use self::neighbours::{CROSS, Neighbours, STEPS, StepWeights, beside, opposite};
 pub use self::provenance::Provenance;
-pub use self::sample::{Differences, Features, GroupLight, Rejected, Sample, Scattering, Taken};
+pub use self::sample::{Differences, Features, GroupLight, Rejected, Sample, Scattering, Taken, Values};
 pub use self::statistic::bin_count;
+pub use self::statistics::{Asker, NEWEST, RECORDED, Recorded, RecordedInfo};
 pub use self::tile::Tile;
 
 use std::sync::Arc;
@@ -177,15 +179,12 @@ mod tests {
 
     fn sample(i: u32) -> Sample {
         let value = (i as f32 * 0.7).sin() + 1.5;
-        let features = Features {
-            albedo: Rgb::splat(0.5),
-            normal: Vec3::Z,
-            depth: value,
-            occlusion: 0.5 * value,
-            position: Vec3::splat(value),
-            ..Features::default()
-        };
-        Sample { color: vec3(value, 2.0, 0.0), direct: Rgb::ONE, features, ambient: Rgb::splat(value), alpha: 1.0 }
+        let features = Features { albedo: Rgb::splat(0.5), normal: Vec3::Z, depth: value, ..Features::default() };
+        let mut values = Values::default();
+        values.set(Recorded::Occlusion, [0.5 * value]);
+        values.set(Recorded::Position, [value; 3]);
+        values.set(Recorded::Alpha, [1.0]);
+        Sample { color: vec3(value, 2.0, 0.0), direct: Rgb::ONE, features, ambient: Rgb::splat(value), values }
     }
 
     /// Adds sample `i` to a pixel, with differences of its size if asked for.
@@ -255,7 +254,7 @@ mod tests {
         let mut bytes = Vec::new();
         film.write(&mut bytes).unwrap();
         let mut tile = Tile::all((2, 1), Needs::ALL, &Kernel::Cross).next().unwrap();
-        tile.read(None, &mut bytes.as_slice()).unwrap();
+        tile.read(NEWEST, &mut bytes.as_slice()).unwrap();
         assert_eq!(tile, film.tiles[0]);
         // The edges are those of the samples that had differences, as if there had been no others.
         let (frame, dense) = (film.develop(), dense.develop());

@@ -1,6 +1,9 @@
 //! The result of one camera path and of its shifted copies.
 
+use std::fmt;
+
 use super::neighbours::STEPS;
+use super::statistics::{RECORDED, Recorded, VALUES};
 use crate::math::{Rgb, Vec3};
 
 /// Auxiliary values at the first surface on the camera path that has a non-delta lobe.
@@ -12,10 +15,6 @@ pub struct Features {
     pub normal: Vec3,
     /// Length of the path from the camera, in scene units.
     pub depth: f32,
-    /// Ambient occlusion sample: 1 if a cosine-distributed direction is unoccluded, 0 otherwise.
-    pub occlusion: f32,
-    /// World position of the surface point.
-    pub position: Vec3,
     /// Least roughness of the material's smooth lobes: 0 without such, 1 for diffuse ones.
     pub roughness: f32,
     /// Kinds of scattering there and before.
@@ -90,8 +89,35 @@ pub struct Sample {
     pub features: Features,
     /// Radiance that an unoccluded ambient light of radiance one would add to the colour.
     pub ambient: Rgb,
-    /// 1 if the path has met something that does not just let it through, 0 if not.
-    pub alpha: f32,
+    /// Further values.
+    pub values: Values,
+}
+
+/// Values of a sample that are there for a statistic alone: of [`Recorded::Alpha`] whether the path has met something that does not just
+/// let it through, of [`Recorded::Occlusion`] whether a direction is unoccluded, of [`Recorded::Position`] the surface point.
+#[derive(Clone, Copy, Default, PartialEq)]
+pub struct Values([f32; VALUES]);
+
+impl Values {
+    /// Values of a statistic.
+    #[inline(always)]
+    pub fn get<const N: usize>(&self, statistic: Recorded) -> [f32; N] {
+        std::array::from_fn(|k| self.0[statistic.offset() + k])
+    }
+
+    /// Sets those of a statistic.
+    #[inline(always)]
+    pub fn set<const N: usize>(&mut self, statistic: Recorded, values: [f32; N]) {
+        self.0[statistic.offset()..][..N].copy_from_slice(&values);
+    }
+}
+
+impl fmt::Debug for Values {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let ends = RECORDED.iter().skip(1).map(|row| row.id.offset()).chain([VALUES]);
+        let spans = RECORDED.iter().zip(ends).map(|(row, end)| (row.name, &self.0[row.id.offset()..end]));
+        f.debug_map().entries(spans.filter(|(_, values)| !values.is_empty())).finish()
+    }
 }
 
 /// The light of one group of emitters in a sample.
@@ -171,8 +197,7 @@ impl Sample {
         let color = |color: &Rgb| color.abs().max_element() <= LARGEST && !color.is_nan();
         finite(color(&self.color), "color")?;
         finite(color(&self.direct), "direct")?;
-        let Features { occlusion, position, .. } = self.features;
-        let mut features = self.features.surface().into_iter().chain([occlusion]).chain(position.to_array());
+        let mut features = self.features.surface().into_iter().chain(self.values.0);
         finite(features.all(value), "features")?;
         finite(color(&self.ambient) && differences.ambient.iter().all(color), "ambient light")?;
         finite(differences.color.iter().all(color), "edges")

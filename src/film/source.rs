@@ -1,7 +1,7 @@
 //! Sources of layers: the statistic that a layer is developed from, and the position of its values in it.
 
 use super::Needs;
-use super::statistic::Record;
+use super::statistics::Record;
 
 /// Source of a layer's values.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,44 +1,26 @@
-//! The table of statistics: everything that a film accumulates per pixel. Tiles, checkpoint files, merging and the memory
-//! of a film are driven by it; [`layer`](super::layer) says which images are developed from which statistic.
+//! A statistic: how values of samples become those of a pixel. Tiles, checkpoint files, merging and the memory of a film are driven by
+//! the [table](super::statistics) of them.
 
 use std::ops::Range;
 
-use super::{BINS, EdgeNeed, Needs, Sample, Taken};
+use super::{BINS, Needs, Recorded, Sample, Taken};
 use crate::math::Rgb;
-
-/// Rows of [`STATISTICS`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Record {
-    Color,
-    Direct,
-    /// Albedo, normal and depth.
-    Surface,
-    Occlusion,
-    Position,
-    /// One end's share of the differences, of every half-edge.
-    Edges,
-    ColorBins,
-    EdgeBins,
-    AmbientBins,
-    AmbientEdgeBins,
-    Alpha,
-    /// Scattered and directly seen light of every group of emitters.
-    Lights,
-}
 
 /// A statistic of every pixel.
 pub(super) struct Statistic {
     /// Number of values in a sample, of a half-edge, or of a group of emitters.
-    values: usize,
+    pub values: usize,
     pub kind: Kind,
     /// Whether it has values of every half-edge, and counts the samples with differences instead of all samples.
     pub of_edges: bool,
     /// Whether it has values of every group of emitters.
-    of_lights: bool,
+    pub of_lights: bool,
     /// If set, the statistic takes no memory in a tile until it says that a sample has a value other than zero.
     pub sparse: Option<fn(&Sample) -> bool>,
-    /// Whether a film with these needs has it.
-    pub recorded: fn(Needs) -> bool,
+    /// Has to be asked for by this name; if none, every film records it.
+    pub asked: Option<Recorded>,
+    /// Version of checkpoint files that first had it.
+    pub since: u32,
     accumulate: fn(Slot, Taken),
 }
 
@@ -51,56 +33,50 @@ pub(super) enum Kind {
     Bins,
 }
 
-const fn moments(values: usize, recorded: fn(Needs) -> bool, accumulate: fn(Slot, Taken)) -> Statistic {
-    Statistic { values, kind: Kind::Moments, of_edges: false, of_lights: false, sparse: None, recorded, accumulate }
+impl Statistic {
+    /// Moments of values that every film records.
+    pub const fn moments(values: usize, accumulate: fn(Slot, Taken)) -> Self {
+        let (kind, asked) = (Kind::Moments, None);
+        Self { values, kind, of_edges: false, of_lights: false, sparse: None, asked, since: 2, accumulate }
+    }
+
+    /// Means in bins.
+    pub const fn bins(values: usize, accumulate: fn(Slot, Taken)) -> Self {
+        Self { kind: Kind::Bins, ..Self::moments(values, accumulate) }
+    }
+
+    /// The statistic for films that were asked for it.
+    pub const fn asked(self, name: Recorded) -> Self {
+        Self { asked: Some(name), ..self }
+    }
+
+    /// The statistic with values of every half-edge.
+    pub const fn of_edges(self) -> Self {
+        Self { of_edges: true, ..self }
+    }
+
+    /// The statistic with values of every group of emitters.
+    pub const fn of_lights(self) -> Self {
+        Self { of_lights: true, ..self }
+    }
+
+    /// The statistic that takes no memory in a tile until `nonzero` is true of a sample.
+    pub const fn sparse(self, nonzero: fn(&Sample) -> bool) -> Self {
+        Self { sparse: Some(nonzero), ..self }
+    }
+
+    /// The statistic that checkpoint files have from a version on.
+    pub const fn since(self, version: u32) -> Self {
+        Self { since: version, ..self }
+    }
+
+    /// Whether a film with these needs has it.
+    pub fn is_recorded(&self, needs: Needs) -> bool {
+        self.asked.is_none_or(|name| needs.has(name))
+            && (!self.of_edges || needs.edges.is_sampled())
+            && (!self.of_lights || needs.lights > 0)
+    }
 }
-
-const fn bins(values: usize, recorded: fn(Needs) -> bool, accumulate: fn(Slot, Taken)) -> Statistic {
-    Statistic { kind: Kind::Bins, ..moments(values, recorded, accumulate) }
-}
-
-const fn of_edges(statistic: Statistic) -> Statistic {
-    Statistic { of_edges: true, ..statistic }
-}
-
-/// Every statistic, in the order of [`Record`] and of checkpoint files.
-pub(super) const STATISTICS: [Statistic; 12] = [
-    moments(3, |_| true, |slot, taken| slot.add(taken.sample.color.to_array())),
-    Statistic {
-        sparse: Some(|sample| sample.direct != Rgb::ZERO),
-        ..moments(3, |_| true, |slot, taken| slot.add(taken.sample.direct.to_array()))
-    },
-    moments(7, |needs| needs.features, |slot, taken| slot.add(taken.sample.features.surface())),
-    moments(1, |needs| needs.occlusion, |slot, taken| slot.add([taken.sample.features.occlusion])),
-    moments(3, |needs| needs.position, |slot, taken| slot.add(taken.sample.features.position.to_array())),
-    of_edges(moments(3, |needs| needs.edges.is_sampled(), |slot, taken| slot.add_colors(taken.colors()))),
-    bins(3, |needs| needs.bins, |slot, taken| slot.add_to_bin(taken.sample.color.to_array())),
-    of_edges(bins(
-        3,
-        |needs| needs.bins && needs.edges.is_sampled(),
-        |slot, taken| slot.add_colors_to_bin(taken.colors()),
-    )),
-    bins(3, |needs| needs.ambient, |slot, taken| slot.add_to_bin(taken.sample.ambient.to_array())),
-    of_edges(bins(
-        3,
-        |needs| needs.ambient && needs.edges.is_sampled(),
-        |slot, taken| slot.add_colors_to_bin(taken.ambients()),
-    )),
-    moments(1, |needs| needs.alpha, |slot, taken| slot.add([taken.sample.alpha])),
-    Statistic {
-        of_lights: true,
-        ..moments(
-            LIGHT,
-            |needs| needs.lights > 0,
-            |slot, taken| {
-                slot.add_all(LIGHT * taken.lights.len(), taken.lights.iter().flat_map(|light| light.values()));
-            },
-        )
-    },
-];
-
-/// Values of a group of emitters: three of its scattered light, then three of what is directly seen.
-pub(super) const LIGHT: usize = 6;
 
 /// Position of a sample among those of its pixel, as the weights that means are updated with.
 #[derive(Clone, Copy)]
@@ -129,13 +105,13 @@ pub(super) struct Slot<'a> {
 impl Slot<'_> {
     /// Updates means and sums of squared deviations (Welford 1962).
     #[inline(always)]
-    fn add<const N: usize>(self, values: [f32; N]) {
+    pub fn add<const N: usize>(self, values: [f32; N]) {
         self.add_all(N, values.into_iter());
     }
 
     /// The same for the colours of all half-edges.
     #[inline(always)]
-    fn add_colors(self, colors: &[Rgb]) {
+    pub fn add_colors(self, colors: &[Rgb]) {
         match <&[Rgb; 4]>::try_from(colors) {
             Ok(cross) => self.add(flatten(cross)),
             Err(_) => self.add_all(3 * colors.len(), colors.iter().flat_map(|color| color.to_array())),
@@ -143,7 +119,7 @@ impl Slot<'_> {
     }
 
     #[inline(always)]
-    fn add_all(self, count: usize, values: impl Iterator<Item = f32>) {
+    pub fn add_all(self, count: usize, values: impl Iterator<Item = f32>) {
         let (means, deviations) = self.values.split_at_mut(count);
         for ((mean, deviation), value) in means.iter_mut().zip(deviations).zip(values) {
             let before = value - *mean;
@@ -154,13 +130,13 @@ impl Slot<'_> {
 
     /// Updates the means of the sample's bin.
     #[inline(always)]
-    fn add_to_bin<const N: usize>(self, values: [f32; N]) {
+    pub fn add_to_bin<const N: usize>(self, values: [f32; N]) {
         self.add_all_to_bin(N, values.into_iter());
     }
 
     /// The same for the colours of all half-edges.
     #[inline(always)]
-    fn add_colors_to_bin(self, colors: &[Rgb]) {
+    pub fn add_colors_to_bin(self, colors: &[Rgb]) {
         match <&[Rgb; 4]>::try_from(colors) {
             Ok(cross) => self.add_to_bin(flatten(cross)),
             Err(_) => self.add_all_to_bin(3 * colors.len(), colors.iter().flat_map(|color| color.to_array())),
@@ -254,27 +230,6 @@ impl Statistic {
     }
 }
 
-impl Record {
-    pub fn statistic(self) -> &'static Statistic {
-        &STATISTICS[self as usize]
-    }
-
-    /// Whether a film with these needs has the statistic.
-    pub fn is_recorded(self, needs: Needs) -> bool {
-        (self.statistic().recorded)(needs)
-    }
-
-    /// Whether the statistic is not recorded because all of its values are known to be zero, in a scene that scatters no
-    /// light. The ambient light is no part of the scene.
-    pub fn is_known_zero(self, needs: Needs) -> bool {
-        if self == Self::AmbientEdgeBins {
-            return false;
-        }
-        let sampled = Needs { edges: EdgeNeed::Sampled, ..needs };
-        needs.edges == EdgeNeed::KnownZero && self.statistic().of_edges && self.is_recorded(sampled)
-    }
-}
-
 /// Samples in bin `k` of a pixel that has `n` of them: sample i is in bin i mod [`BINS`].
 pub fn bin_count(n: u32, k: usize) -> u32 {
     (n + (BINS - 1 - k) as u32) / BINS as u32
@@ -283,29 +238,6 @@ pub fn bin_count(n: u32, k: usize) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn rows_are_in_the_order_of_their_names() {
-        let names = [
-            (Record::Color, 3),
-            (Record::Direct, 3),
-            (Record::Surface, 7),
-            (Record::Occlusion, 1),
-            (Record::Position, 3),
-            (Record::Edges, 3),
-            (Record::ColorBins, 3),
-            (Record::EdgeBins, 3),
-            (Record::AmbientBins, 3),
-            (Record::AmbientEdgeBins, 3),
-            (Record::Alpha, 1),
-            (Record::Lights, LIGHT),
-        ];
-        assert_eq!(names.len(), STATISTICS.len());
-        for (k, (record, values)) in names.into_iter().enumerate() {
-            assert_eq!((record as usize, record.statistic().values), (k, values));
-        }
-        assert!(Record::Direct.statistic().sparse.is_some() && Record::AmbientEdgeBins.statistic().of_edges);
-    }
 
     #[test]
     fn bins_share_the_samples_in_turn() {

@@ -3,7 +3,7 @@
 
 use std::io::{self, Read, Write};
 
-use super::statistic::STATISTICS;
+use super::statistics::STATISTICS;
 use super::{Film, Tile};
 
 /// Appends a list of words with its length.
@@ -37,14 +37,13 @@ impl Tile {
         }
     }
 
-    /// Fills an empty tile by one of a film that was written when there were so many statistics, if not as many as now.
-    pub fn read(&mut self, statistics: Option<usize>, from: &mut impl Read) -> io::Result<()> {
-        let statistics = statistics.unwrap_or(STATISTICS.len());
+    /// Fills an empty tile by one of a checkpoint file of a version, which lacks the statistics that are newer.
+    pub fn read(&mut self, version: u32, from: &mut impl Read) -> io::Result<()> {
         let pixels = self.counts.len();
         self.counts = take(from, [pixels; 2])?;
         self.edge_counts = take(from, [self.edge_counts.len(); 2])?;
         self.rejected = take(from, [0, pixels])?;
-        for (k, statistic) in STATISTICS.iter().enumerate().take(statistics) {
+        for (k, statistic) in STATISTICS.iter().enumerate().take_while(|(_, statistic)| statistic.since <= version) {
             let allowed =
                 if statistic.sparse.is_some() { [0, self.floats(statistic)] } else { [self.planes[k].len(); 2] };
             self.planes[k] = take(from, allowed)?.into_iter().map(f32::from_bits).collect();

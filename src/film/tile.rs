@@ -2,7 +2,8 @@
 
 use std::ops::Range;
 
-use super::statistic::{Ordinal, STATISTICS, Statistic};
+use super::statistic::{Ordinal, Statistic};
+use super::statistics::STATISTICS;
 use super::{Differences, GroupLight, Kernel, Needs, Neighbours, Rejected, Sample, TILE, Taken};
 
 /// The half-edges of the first pixel of a tile where every pixel has the four of the cross.
@@ -43,7 +44,7 @@ impl Tile {
         let lights = usize::from(needs.lights);
         let mut tile = Self { x, y, width, height, lights, counts, edge_counts, rejected, half_edges, planes };
         for (k, statistic) in STATISTICS.iter().enumerate() {
-            if (statistic.recorded)(needs) && statistic.sparse.is_none() {
+            if statistic.is_recorded(needs) && statistic.sparse.is_none() {
                 tile.planes[k] = vec![0.0; tile.floats(statistic)];
             }
         }
@@ -80,7 +81,7 @@ impl Tile {
         }
         self.edge_counts.fill(0);
         for (k, statistic) in STATISTICS.iter().enumerate().filter(|(_, statistic)| statistic.of_edges) {
-            self.planes[k] = vec![0.0; if (statistic.recorded)(needs) { self.floats(statistic) } else { 0 }];
+            self.planes[k] = vec![0.0; if statistic.is_recorded(needs) { self.floats(statistic) } else { 0 }];
         }
     }
 

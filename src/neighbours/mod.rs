@@ -13,7 +13,7 @@ mod structure;
 
 pub use self::learned::Encoder;
 pub use self::selector::Selector;
-use crate::film::{Frame, Needs, STEPS, StepWeights};
+use crate::film::{Frame, Needs, Recorded, STEPS, StepWeights};
 
 /// A row of the table of kernels.
 pub struct KernelKind {
@@ -50,7 +50,7 @@ struct PilotNeeds {
 
 /// Features of the first samples.
 const FEATURES: PilotNeeds =
-    PilotNeeds { needs: Needs { features: true, ..Needs::NONE }, samples: 4, least: 1, encoded: false };
+    PilotNeeds { needs: Needs::NONE.with(Recorded::Features), samples: 4, least: 1, encoded: false };
 
 /// The first samples of a render, without differences.
 pub struct Pilot<'a> {

@@ -8,7 +8,7 @@ use super::edge_means::{self, Missing};
 use super::inputs::{Inputs, check_memory};
 use super::{Context, Method, Note, Parameter, Parameters, Reconstruction, Solution, Traits};
 use crate::error::{Error, Result};
-use crate::film::{EdgeParts, Edges, Frame, HalfEdge, Layer, Needs, half};
+use crate::film::{EdgeParts, Edges, Frame, HalfEdge, Layer, Needs, Recorded, half};
 use crate::image::Image;
 use crate::image::planes::Planes;
 use crate::math::{Rgb, vec3};
@@ -76,7 +76,7 @@ struct ControlVariate {
 
 impl Reconstruction for ControlVariate {
     fn needs(&self) -> Needs {
-        Needs { bins: self.weighting == Weighting::Cross, ..Needs::EDGES }
+        Needs::EDGES.with_if(Recorded::Bins, self.weighting == Weighting::Cross)
     }
 
     fn reconstruct(&self, frame: &Frame, context: &Context) -> Result<Solution> {

@@ -12,7 +12,7 @@ use super::features::{Feature, Kind};
 use super::inputs::Inputs;
 use super::{Parameter, Parameters};
 use crate::error::Result;
-use crate::film::{BINS, EdgeParts, Edges, Layer, Needs, bin_count};
+use crate::film::{BINS, EdgeParts, Edges, Layer, Needs, Recorded, bin_count};
 use crate::image::nl_means::{self, Guide, Guides, rdfc};
 use crate::image::planes::Planes;
 use crate::math::rng;
@@ -98,12 +98,15 @@ impl Options {
     /// Statistics that the feature is made from.
     pub fn needs(&self) -> Needs {
         let features = self.prefilter == Prefilter::Rdfc;
-        Needs { features, bins: true, ambient: self.ambient > 0.0, ..Needs::EDGES }
+        Needs::EDGES
+            .with(Recorded::Bins)
+            .with_if(Recorded::Features, features)
+            .with_if(Recorded::Ambient, self.ambient > 0.0)
     }
 
     /// The same without albedo and normal.
     pub fn without_features(self) -> Self {
-        let prefilter = if self.needs().features { Prefilter::NonLocalMeans } else { self.prefilter };
+        let prefilter = if self.needs().has(Recorded::Features) { Prefilter::NonLocalMeans } else { self.prefilter };
         Self { prefilter, ..self }
     }
 }

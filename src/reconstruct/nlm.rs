@@ -5,7 +5,7 @@ use super::features::{Feature, Kind, without_features};
 use super::inputs::{Inputs, check_memory};
 use super::{Context, Method, Parameter, Parameters, Reconstruction, Solution, Traits};
 use crate::error::Result;
-use crate::film::{Frame, Needs};
+use crate::film::{Frame, Needs, Recorded};
 use crate::image::nl_means::{self, Guides, NlmSettings};
 use crate::image::planes::Planes;
 
@@ -70,7 +70,7 @@ impl Nlm {
 
 impl Reconstruction for Nlm {
     fn needs(&self) -> Needs {
-        Needs { features: self.features, ..Needs::default() }
+        Needs::NONE.with_if(Recorded::Features, self.features)
     }
 
     fn warnings(&self, frame: &Frame) -> Vec<String> {

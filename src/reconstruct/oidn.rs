@@ -3,7 +3,7 @@
 use super::features::without_features;
 use super::{Context, Method, Parameter, Parameters, Reconstruction, Solution, Traits};
 use crate::error::Result;
-use crate::film::{Frame, Layer, Needs};
+use crate::film::{Frame, Layer, Needs, Recorded};
 use crate::image::Image;
 use crate::image::oidn::{Features, Quality, check, denoise};
 
@@ -54,7 +54,7 @@ struct Oidn {
 
 impl Reconstruction for Oidn {
     fn needs(&self) -> Needs {
-        Needs { features: true, ..Needs::default() }
+        Needs::NONE.with(Recorded::Features)
     }
 
     fn warnings(&self, frame: &Frame) -> Vec<String> {

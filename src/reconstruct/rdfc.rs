@@ -4,7 +4,7 @@ use super::features::{Feature, Kind};
 use super::inputs::{Inputs, check_memory};
 use super::{Context, Method, Parameter, Parameters, Reconstruction, Solution, Traits};
 use crate::error::Result;
-use crate::film::{Frame, Needs};
+use crate::film::{Frame, Needs, Recorded};
 use crate::image::nl_means::Guides;
 use crate::image::nl_means::rdfc::{self, Denoised, Options};
 
@@ -35,7 +35,7 @@ struct Rdfc {
 
 impl Reconstruction for Rdfc {
     fn needs(&self) -> Needs {
-        Needs { features: true, ..Needs::default() }
+        Needs::NONE.with(Recorded::Features)
     }
 
     fn estimates_error(&self) -> bool {

@@ -1,6 +1,6 @@
 //! Features of camera paths: albedo, normal, depth, position and ambient occlusion of the surface that a pixel shows.
 
-use crate::film::{Features, Scattering};
+use crate::film::{Features, Recorded, Sample, Scattering};
 use crate::math::frame::Frame;
 use crate::math::{Rgb, Vec2, Vec3, warp};
 use crate::scene::bsdf::{BsdfSample, Lobe};
@@ -26,7 +26,7 @@ impl FeatureWalk {
     /// Visits a surface that the path reaches from the given point.
     pub fn visit(
         &mut self,
-        features: &mut Features,
+        sample: &mut Sample,
         scene: &Scene,
         (surfaces, materials, lane): (&Surfaces, &Materials, usize),
         from: Vec3,
@@ -41,14 +41,16 @@ impl FeatureWalk {
             let albedo = materials.albedo(scene, surfaces, lane) * tint;
             let (normal, depth) = (surfaces.frame.n.get(lane) * side, self.length);
             let (lobes, seen_through) = (materials.roughness().0[lane], self.tint.is_some());
-            let scattering = features
+            let scattering = sample
+                .features
                 .scattering
                 .with(Scattering::DIFFUSE, lobes == f32::INFINITY)
                 .with(Scattering::GLOSSY, smooth && lobes < f32::INFINITY)
                 .with(Scattering::SPECULAR, seen_through || !smooth)
                 .with(Scattering::EMISSION, surfaces.emissive.get(lane));
             let roughness = lobes.clamp(0.0, 1.0);
-            *features = Features { albedo, normal, depth, position: p, roughness, scattering, ..*features };
+            sample.features = Features { albedo, normal, depth, roughness, scattering };
+            sample.values.set(Recorded::Position, p.to_array());
         }
         self.found = smooth;
     }
@@ -76,18 +78,21 @@ impl FeatureWalk {
 /// Range of ambient occlusion, as a share of the scene's size.
 const RANGE: f32 = 0.1;
 
-/// 1 if a cosine-distributed direction from the features' surface is unoccluded, else 0.
-pub fn occlusion(scene: &Scene, features: &Features, u: Vec2) -> f32 {
-    if features.normal == Vec3::ZERO {
-        return 1.0;
-    }
-    let direction = Frame::around(features.normal).to_world(warp::cosine_hemisphere(u));
-    f32::from(u8::from(scene.is_unoccluded(features.position, features.normal, direction, RANGE)))
+/// Sets the occlusion to 1 if a cosine-distributed direction from the surface that the sample shows is unoccluded, else to 0.
+pub fn set_occlusion(sample: &mut Sample, scene: &Scene, u: Vec2) {
+    let normal = sample.features.normal;
+    let is_free = normal == Vec3::ZERO || {
+        let direction = Frame::around(normal).to_world(warp::cosine_hemisphere(u));
+        scene.is_unoccluded(sample.values.get(Recorded::Position).into(), normal, direction, RANGE)
+    };
+    sample.values.set(Recorded::Occlusion, [f32::from(u8::from(is_free))]);
 }
 
-/// Features of a camera ray that hits nothing: a point beyond the scene.
-pub fn far(scene: &Scene, Ray { origin, direction, .. }: Ray) -> Features {
+/// Describes a camera ray that hits nothing, as far as it is known: a point beyond the scene.
+pub fn set_far(sample: &mut Sample, scene: &Scene, Ray { origin, direction, .. }: Ray) {
     let (center, radius) = scene.bounds().sphere();
     let depth = origin.distance(center) + radius;
-    Features { depth, position: origin + direction * depth, occlusion: 1.0, roughness: 1.0, ..Features::default() }
+    sample.features = Features { depth, roughness: 1.0, ..Features::default() };
+    sample.values.set(Recorded::Position, (origin + direction * depth).to_array());
+    sample.values.set(Recorded::Occlusion, [1.0]);
 }

@@ -7,7 +7,7 @@ use super::group_lights::GroupLights;
 use super::paths::Packet;
 use super::thinning::Work;
 use super::vertices::{Emission, Vertices};
-use crate::film::Sample;
+use crate::film::{Recorded, Sample};
 use crate::math::Rgb;
 use crate::math::lanes::{LANES, Mask};
 use crate::scene::Scene;
@@ -71,7 +71,10 @@ impl PathRecord {
                 continue;
             }
             // Through holes the camera sees the environment as it sees it beside them.
-            if scene.integrator().hide_emitters && !hit.get(lane) && self.samples[id].alpha == 0.0 {
+            if scene.integrator().hide_emitters
+                && !hit.get(lane)
+                && self.samples[id].values.get(Recorded::Alpha) == [0.0]
+            {
                 continue;
             }
             self.samples[id].color += found.color;
@@ -95,7 +98,7 @@ impl PathRecord {
 
     /// Marks the samples of paths that have met something, be it the environment.
     pub fn cover(&mut self, packet: &Packet, lanes: Mask) {
-        lanes.lanes().for_each(|lane| self.samples[packet.id.0[lane] as usize].alpha = 1.0);
+        lanes.lanes().for_each(|lane| self.samples[packet.id.0[lane] as usize].values.set(Recorded::Alpha, [1.0]));
     }
 
     /// Updates the features by the surfaces that active paths have come to.
@@ -108,13 +111,13 @@ impl PathRecord {
     ) {
         for lane in active.lanes() {
             let id = packet.id.0[lane] as usize;
-            let (walk, features) = (&mut self.walks[id], &mut self.samples[id].features);
+            let (walk, sample) = (&mut self.walks[id], &mut self.samples[id]);
             if depth == 0 {
-                *features = features::far(scene, packet.rays.get(lane));
+                features::set_far(sample, scene, packet.rays.get(lane));
             }
             if hit.get(lane) && !walk.is_done() {
                 let surface = (&vertices.surfaces, &vertices.materials, lane);
-                walk.visit(features, scene, surface, packet.rays.origin.get(lane));
+                walk.visit(sample, scene, surface, packet.rays.origin.get(lane));
             }
         }
     }

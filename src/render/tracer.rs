@@ -6,7 +6,7 @@ use super::continuation::shade;
 use super::paths::{Order, Packet, Paths};
 use super::record::PathRecord;
 use super::vertices::Vertices;
-use crate::film::Needs;
+use crate::film::{Needs, Recorded};
 use crate::math::Rgb;
 use crate::math::lanes::{LANES, Lanes, Lanes3, Mask};
 use crate::scene::closure::KINDS;
@@ -105,20 +105,15 @@ impl<'a> PathTracer<'a> {
             }
             let shaded = shade((scene, &sampler), depth, packet, vertices, (k * LANES) as u32, next);
             record.add_direct(scene, depth, vertices, &shaded);
-            if needs.alpha || scene.integrator().hide_emitters {
+            if needs.has(Recorded::Alpha) || scene.integrator().hide_emitters {
                 record.cover(packet, vertices.hit & !vertices.passed);
             }
-            if describes(*needs) || needs.ambient {
-                record.update_after_scatter(vertices, needs.ambient);
+            if needs.describe_surfaces() || needs.has(Recorded::Ambient) {
+                record.update_after_scatter(vertices, needs.has(Recorded::Ambient));
             }
         }
         record.levels[at] = level;
     }
-}
-
-/// Whether paths have to describe the surfaces that they come to.
-fn describes(needs: Needs) -> bool {
-    needs.features || needs.occlusion || needs.position
 }
 
 /// Completes the hits of the active paths of a packet, records emission and features, and leaves in `vertices.hit` the surfaces that
@@ -139,16 +134,16 @@ fn arrive(
         record.add_emission(scene, depth, packet, (vertices, active, hit), recorded);
     }
     vertices.materials.evaluate(scene, &vertices.surfaces, hit);
-    if describes(needs) {
+    if needs.describe_surfaces() {
         record.describe(scene, depth, packet, (vertices, active, hit));
     }
-    if needs.alpha && depth == 0 && scene.has_environment() && !hide_emitters {
+    if needs.has(Recorded::Alpha) && depth == 0 && scene.has_environment() && !hide_emitters {
         record.cover(packet, active);
     }
     vertices.hits_emitter = Mask::NONE;
     if depth + 1 >= max_depth {
         vertices.hit = Mask::NONE;
-        if needs.alpha {
+        if needs.has(Recorded::Alpha) {
             record.cover(packet, hit);
         }
         return;

@@ -8,7 +8,7 @@ use super::record::PathRecord;
 use super::seen;
 use super::thinning::Work;
 use super::tracer::PathTracer;
-use crate::film::{CROSS, Differences, GroupLight, Needs, Neighbours, Sample, Taken};
+use crate::film::{CROSS, Differences, GroupLight, Needs, Neighbours, Recorded, Sample, Taken};
 use crate::math::lanes::LANES;
 use crate::math::vec2;
 use crate::scene::Scene;
@@ -61,12 +61,12 @@ impl<'a> Wave<'a> {
     pub fn new(scene: &'a Scene, needs: Needs, shift: Shift, neighbours: Option<&'a Neighbours>) -> Self {
         Self {
             tracer: PathTracer::new(scene, needs),
-            shift: needs.edges.is_sampled().then(|| shift.mapping(needs.ambient)),
+            shift: needs.edges.is_sampled().then(|| shift.mapping(needs.has(Recorded::Ambient))),
             neighbours,
             slots: neighbours.map_or(CROSS.count_ones() as usize, Neighbours::most),
             record: PathRecord::default(),
             half_edges: HalfEdges::default(),
-            occlusion: needs.occlusion,
+            occlusion: needs.has(Recorded::Occlusion),
             surfaces: Surfaces::default(),
         }
     }
@@ -102,7 +102,7 @@ impl<'a> Wave<'a> {
                 let [u, v] = camera.sampler.occlusion(camera.hashes(first * LANES));
                 for (lane, sample) in samples.iter_mut().enumerate() {
                     let numbers = vec2(u.0[lane], v.0[lane]);
-                    sample.features.occlusion = features::occlusion(self.tracer.scene, &sample.features, numbers);
+                    features::set_occlusion(sample, self.tracer.scene, numbers);
                 }
             }
         }

@@ -3,7 +3,7 @@
 use super::frame::{COLOR, SIZE, average, denoisers, farthest, methods, mse, names, noisy, not_finite, run};
 use super::{Case, Checks};
 use crate::error::Result;
-use crate::film::{BINS, Frame, Layer};
+use crate::film::{BINS, Frame, Layer, Recorded};
 use crate::image::Image;
 use crate::math::vec3;
 use crate::reconstruct::EdgeTrust;
@@ -290,9 +290,9 @@ fn missing(checks: &mut Checks) -> Result<()> {
             (true, Layer::Color),
             (needs.edges.is_on(), Layer::Dx),
             (needs.edges.is_on(), Layer::DyVariance),
-            (needs.bins, Layer::BinColor(3)),
-            (needs.bins && needs.edges.is_on(), Layer::BinDx(7)),
-            (needs.features, Layer::Normal),
+            (needs.has(Recorded::Bins), Layer::BinColor(3)),
+            (needs.has(Recorded::Bins) && needs.edges.is_on(), Layer::BinDx(7)),
+            (needs.has(Recorded::Features), Layer::Normal),
         ]
         .into_iter()
         .filter_map(|(needed, layer)| needed.then_some(layer))

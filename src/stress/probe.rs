@@ -5,7 +5,7 @@ use std::sync::atomic::AtomicBool;
 use super::Checks;
 use super::frame::{average, not_finite};
 use crate::error::Result;
-use crate::film::{Film, Frame, Layer, Needs};
+use crate::film::{Film, Frame, Layer, Needs, Recorded};
 use crate::reconstruct::{Context, parse, solve};
 use crate::render::{Budget, Control, RenderSettings, SHIFTS, Shift, render};
 use crate::scene::{Scene, load};
@@ -94,7 +94,7 @@ impl Probe {
         let means = self.means();
         let mean = means.iter().sum::<f64>() / RUNS as f64;
         checks.add(format!("{subject}, path"), "departure of the mean", (mean / expected - 1.0).abs(), bound);
-        let needs = Needs { features: true, ..Needs::EDGES };
+        let needs = Needs::EDGES.with(Recorded::Features);
         for name in SHIFTS.iter().map(|kind| kind.id) {
             let shift = Shift::named(name).unwrap_or_default();
             let films: Vec<Film> = (0..RUNS).map(|run| self.film(100 + run, needs, shift)).collect();

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use crate::common::{bundled, check_zero, film};
 use fluxion::adaptive::{self, ALLOCATORS, AdaptiveSettings, Allocator, Limits};
 use fluxion::error::Result;
-use fluxion::film::{Frame, Layer, Needs};
+use fluxion::film::{Frame, Layer, Needs, Recorded};
 use fluxion::math::rng;
 use fluxion::plan::Plan;
 use fluxion::reconstruct::{self, Context, METHODS, Solution};
@@ -218,7 +218,7 @@ fn colours_and_differences_are_unbiased_whatever_the_counts() {
 
 #[test]
 fn differences_of_the_ambient_light_are_those_of_its_colour() {
-    let needs = Needs { ambient: true, ..Needs::EDGES };
+    let needs = Needs::EDGES.with(Recorded::Ambient);
     for name in ["unit/diffuse", "unit/rough-conductor", "unit/dielectric", "unit/rough-plastic"] {
         let scene = bundled(name, (24, 18));
         let pairs: Vec<[Frame; 2]> =

@@ -1,7 +1,7 @@
 //! Films and files: threads do not matter, nothing is lost on disk, an independent reader sees the same.
 
 use crate::common::{bundled, film, sensor};
-use fluxion::film::{Frame, Layer, Needs, exr as layers};
+use fluxion::film::{Frame, Layer, Needs, Recorded, exr as layers};
 use fluxion::image::Image;
 use fluxion::math::Rgb;
 use fluxion::plan::Plan;
@@ -66,7 +66,7 @@ fn corner(x: f32) -> fluxion::scene::Scene {
 
 #[test]
 fn half_of_the_directions_are_open_beside_a_wall_and_all_of_them_in_the_open() {
-    let needs = Needs { features: true, occlusion: true, position: true, ..Needs::default() };
+    let needs = Needs::NONE.with(Recorded::Features).with(Recorded::Occlusion).with(Recorded::Position);
     for (x, expected) in [(-0.02, 0.5), (-9.0, 1.0)] {
         let frame = film(&corner(x), 1024, 1, needs).develop();
         let open = frame.get(Layer::Occlusion).unwrap();
@@ -138,7 +138,7 @@ fn luminaires_are_seen_by_paths_of_one_edge_and_not_where_they_are_hidden() {
 #[test]
 fn what_nobody_needs_is_not_recorded() {
     let scene = bundled("unit/diffuse", (8, 6));
-    let frame = film(&scene, 4, 1, Needs { features: true, bins: true, ..Needs::EDGES }).develop();
+    let frame = film(&scene, 4, 1, Needs::EDGES.with(Recorded::Features).with(Recorded::Bins)).develop();
     for layer in [Layer::Occlusion, Layer::Position, Layer::BinAmbient(0), Layer::BinAmbientDx(3)] {
         assert!(frame.get(layer).is_none(), "{}", layer.name());
     }

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use assert_cmd::Command;
 use fluxion::checkpoint::{self, Origin, Run};
-use fluxion::film::{EdgeNeed, EdgeParts, Edges, Film, Kernel, Layer, Needs};
+use fluxion::film::{EdgeNeed, EdgeParts, Edges, Film, Kernel, Layer, Needs, Recorded};
 use fluxion::image::Image;
 use fluxion::neighbours::Selector;
 use fluxion::reconstruct::{self, Context};
@@ -95,7 +95,7 @@ fn check_unbiased(name: &str, kernel: &str, shift: &str, max_depth: Option<u32>)
     check_zero(&format!("{name}, {kernel}"), &runs);
 }
 
-const NEEDS: Needs = Needs { features: true, ..Needs::EDGES };
+const NEEDS: Needs = Needs::EDGES.with(Recorded::Features);
 
 macro_rules! unbiased {
     ($($test:ident: $scene:literal, $kernel:literal, $shift:literal;)*) => {

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use fluxion::adaptive::{self, AdaptiveSettings, Limits};
-use fluxion::film::{Frame, Layer, Needs, exr};
+use fluxion::film::{Frame, Layer, Needs, Recorded, exr};
 use fluxion::image::Image;
 use fluxion::image::io::{Pixels, read};
 use fluxion::plan::Plan;
@@ -60,7 +60,7 @@ fn mean(image: &Image) -> [f64; 3] {
 fn groups_add_up_to_the_colour_and_change_no_bit_of_it() {
     let grouped = room(&[]);
     let plain = load_text(ROOM, &Options::default()).unwrap();
-    let needs = Needs { features: true, ..Needs::EDGES };
+    let needs = Needs::EDGES.with(Recorded::Features);
     let (with, without) = (frame(&grouped, needs, 8), frame(&plain, needs, 8));
     assert_eq!(with.lights.iter().map(|lights| lights.name.as_str()).collect::<Vec<_>>(), ["key", "rest"]);
     with.present().for_each(|(layer, image)| assert_eq!(Some(image), without.get(layer), "{layer:?}"));

@@ -1,7 +1,7 @@
 //! Scene files that are wrong, odd or hostile: an error that names the place, or a correct image; never a panic.
 
 use crate::common::{film, scene, sensor, try_scene};
-use fluxion::film::{Layer, Needs};
+use fluxion::film::{Layer, Needs, Recorded};
 use fluxion::math::{vec2, vec3};
 use fluxion::scene::emitter::Position;
 use fluxion::scene::{Ray, load};
@@ -129,7 +129,7 @@ fn files_that_blow_up_are_refused() {
 /// Mean colour of a small render with directly seen emitters.
 fn mean(body: &str) -> f32 {
     let scene = scene(body);
-    let frame = film(&scene, 16, 1, Needs { features: true, ..Needs::EDGES }).develop();
+    let frame = film(&scene, 16, 1, Needs::EDGES.with(Recorded::Features)).develop();
     assert_eq!(frame.get(Layer::Rejected).unwrap().data.iter().sum::<f32>(), 0.0);
     let sum = |layer| frame.get(layer).unwrap().data.iter().sum::<f32>();
     (sum(Layer::Color) + sum(Layer::Direct)) / frame.get(Layer::Color).unwrap().data.len() as f32
@@ -187,7 +187,7 @@ fn degenerate_meshes_are_harmless() {
         "",
     ] {
         let scene = with_mesh(obj).unwrap_or_else(|error| panic!("{obj}: {error}"));
-        let frame = film(&scene, 2, 1, Needs { features: true, ..Needs::EDGES }).develop();
+        let frame = film(&scene, 2, 1, Needs::EDGES.with(Recorded::Features)).develop();
         assert!(frame.present().all(|(_, image)| image.data.iter().all(|value| value.is_finite())), "{obj}");
     }
     assert!(with_mesh("v 0 0 0\nv 1 0 0\nf 1 2 9\n").is_err());

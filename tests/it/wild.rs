@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use crate::common::{film, sensor};
 use fluxion::Result;
-use fluxion::film::{Film, Layer, Needs};
+use fluxion::film::{Film, Layer, Needs, Recorded};
 use fluxion::scene::{Scene, load};
 
 /// A scene of some files, of which `scene.xml` is the first to be read.
@@ -107,7 +107,7 @@ fn folders_of_paths_come_before_the_scenes_own_the_last_one_first() {
             file("3.0.0", &format!("{paths}<shape type=\"obj\"><string name=\"filename\" value=\"m.obj\"/></shape>"));
         let files = [("m.obj", &own), ("a/m.obj", &first), ("b/m.obj", &second), ("scene.xml", &main)];
         let scene = scene_of(&files.map(|(name, text)| (name, text.as_bytes())), &load::Options::default()).unwrap();
-        let frame = film(&scene, 1, 1, Needs { features: true, ..Needs::default() }).develop();
+        let frame = film(&scene, 1, 1, Needs::NONE.with(Recorded::Features)).develop();
         let found = frame.get(Layer::Depth).unwrap().rgb(8, 8).x;
         assert!((found - depth).abs() < 0.05, "{paths}: {found}");
     }
@@ -294,9 +294,8 @@ fn files_of_version_0_6_show_what_their_translations_show() {
             material("<bsdf type=\"roughdielectric\"/>"),
         ),
     ] {
-        let [old_film, new_film] = [("0.6.0", &old), ("3.0.0", &new)].map(|(version, body)| {
-            film(&text(&file(version, body)), 4, 1, Needs { features: true, ..Needs::default() })
-        });
+        let [old_film, new_film] = [("0.6.0", &old), ("3.0.0", &new)]
+            .map(|(version, body)| film(&text(&file(version, body)), 4, 1, Needs::NONE.with(Recorded::Features)));
         for (old_pixel, new_pixel) in pixels(&old_film).into_iter().zip(pixels(&new_film)) {
             near(old_pixel, new_pixel, &old);
         }
@@ -443,7 +442,7 @@ fn hidden_environments_are_hidden_behind_holes_too() {
             "{hidden}<shape type=\"rectangle\"><transform name=\"to_world\"><scale value=\"9\"/></transform>{material}</shape>\
             <emitter type=\"constant\"/>"
         );
-        let frame = film(&text(&file("3.0.0", &body)), 256, 1, Needs { alpha: true, ..Needs::default() }).develop();
+        let frame = film(&text(&file("3.0.0", &body)), 256, 1, Needs::NONE.with(Recorded::Alpha)).develop();
         let mean = |layer| {
             let image = frame.get(layer).unwrap();
             image.data.iter().sum::<f32>() / image.data.len() as f32
@@ -562,7 +561,7 @@ fn shared_examples_have_their_values() {
     let message = load::load(&folder.join("unused-definition/scene.xml"), &options).err().unwrap().to_string();
     assert!(message.contains("no parameter `angel`; it has `angle`"), "{message}");
     let alpha = load("alpha/scene.xml", &[]);
-    let frame = film(&alpha, 64, 1, Needs { alpha: alpha.sensor().wants_alpha(), ..Needs::default() }).develop();
+    let frame = film(&alpha, 64, 1, Needs::NONE.with_if(Recorded::Alpha, alpha.sensor().wants_alpha())).develop();
     let alpha = &frame.get(Layer::Alpha).unwrap().data;
     assert!(alpha[8 * 16 + 8] == 1.0 && alpha[0] == 0.0);
     assert!((alpha.iter().sum::<f32>() / 256.0 - 0.349).abs() < 5e-3, "{}", alpha.iter().sum::<f32>() / 256.0);

@@ -12,7 +12,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser};
 use fluxion::adaptive::{self, ALLOCATORS, Allocator, Goals, Limits, Start};
 use fluxion::checkpoint::{Origin, Run, content};
 use fluxion::error::Error;
-use fluxion::film::Needs;
+use fluxion::film::{Needs, Recorded};
 use fluxion::neighbours::Selector;
 use fluxion::plan::Plan;
 use fluxion::reconstruct;
@@ -24,7 +24,7 @@ use self::job::Job;
 use super::outputs::Claims;
 use super::stats::Stats;
 use super::viewer::{self, Viewer};
-use super::{checkpoint, kernel, method, progress, stats};
+use super::{checkpoint, kernel, method, progress, statistics, stats};
 use crate::cli::interrupt::stop_on_signal;
 use crate::cli::terminal::{note, out};
 
@@ -79,18 +79,8 @@ pub struct Args {
     /// Folder for every camera sample's colour, features and differences, as arrays for NumPy
     #[arg(long, value_name = "DIR", conflicts_with_all = ["time", "adaptive", "target_error", "checkpoint"])]
     samples: Option<PathBuf>,
-    /// Record the statistics of eight groups of samples, the even ones independent of the odd ones, in the layers
-    #[arg(long, requires = "layers")]
-    bins: bool,
-    /// Record ambient occlusion in the layers
-    #[arg(long, requires = "layers")]
-    occlusion: bool,
-    /// Record world positions in the layers
-    #[arg(long, requires = "layers")]
-    position: bool,
-    /// Record the radiance that an ambient light would add in the layers, by which `feature:ambient` sees unlit surfaces
-    #[arg(long, requires = "layers")]
-    ambient: bool,
+    #[command(flatten)]
+    statistics: statistics::Args,
     /// EXR file of Cryptomatte layers: shares of pixels by objects and materials, named by their ids in the scene file
     #[arg(long, value_name = "FILE")]
     cryptomatte: Option<PathBuf>,
@@ -274,16 +264,8 @@ fn goals(args: &Args, scene: &Scene) -> Result<Option<Vec<u32>>> {
 fn saved(args: &Args, needed: Needs) -> Needs {
     match (&args.layers, &args.samples) {
         (None, None) => Needs::default(),
-        (None, Some(_)) => Needs { features: true, ..Needs::default() },
-        (Some(_), _) => Needs {
-            features: true,
-            edges: needed.edges,
-            bins: args.bins,
-            occlusion: args.occlusion,
-            position: args.position,
-            ambient: args.ambient,
-            ..Needs::NONE
-        },
+        (None, Some(_)) => Needs::NONE.with(Recorded::Features),
+        (Some(_), _) => Needs { edges: needed.edges, ..args.statistics.0 }.with(Recorded::Features),
     }
 }
 

@@ -18,7 +18,7 @@ use super::generated::{self, Options};
 use super::inputs::{FLOOR, Inputs, check_memory, floor_variance};
 use super::{Context, EdgeTrust, Method, Parameter, Parameters, Reconstruction, Solution, Traits};
 use crate::error::Result;
-use crate::film::{Frame, Layer, Needs};
+use crate::film::{Frame, Layer, Needs, Recorded};
 use crate::image::nl_means::{self, Guide, Guides, NlmSettings};
 use crate::image::planes::Planes;
 
@@ -125,12 +125,10 @@ fn make(parameters: &Parameters) -> Result<Box<dyn Reconstruction>> {
 impl Reconstruction for Apr {
     fn needs(&self) -> Needs {
         let named = |name| self.layers.iter().any(|&k| LAYERS[k].0 == name);
-        let own = Needs {
-            features: named("normal") || named("albedo") || named("depth"),
-            occlusion: named("occlusion"),
-            position: named("position"),
-            ..Needs::default()
-        };
+        let own = Needs::NONE
+            .with_if(Recorded::Features, named("normal") || named("albedo") || named("depth"))
+            .with_if(Recorded::Occlusion, named("occlusion"))
+            .with_if(Recorded::Position, named("position"));
         own.union(self.generated.as_ref().map(Options::needs).unwrap_or_default())
     }
 

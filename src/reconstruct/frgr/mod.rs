@@ -31,7 +31,7 @@ use super::features::{Feature, Kind};
 use super::inputs::Inputs;
 use super::{Context, EdgeTrust, Method, Note, Parameter, Parameters, Reconstruction, Solution, Traits};
 use crate::error::{Error, Result};
-use crate::film::{EdgeNeed, Frame, Needs};
+use crate::film::{EdgeNeed, Frame, Needs, Recorded};
 use crate::image::Image;
 use crate::image::nl_means::rdfc::Denoised;
 use crate::image::planes::Planes;
@@ -123,7 +123,7 @@ struct Prepared {
 impl Reconstruction for Frgr {
     fn needs(&self) -> Needs {
         let features = !self.features.is_empty() || self.denoiser != Denoiser::Rdfc;
-        Needs { features, edges: EdgeNeed::Thinned, ..Needs::default() }
+        Needs { edges: EdgeNeed::Thinned, ..Needs::NONE }.with_if(Recorded::Features, features)
     }
 
     fn estimates_error(&self) -> bool {

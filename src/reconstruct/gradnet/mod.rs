@@ -22,7 +22,7 @@ use super::inputs::{Inputs, TRAINED_SAMPLES, check_memory};
 use super::residual::{estimated_error, noise, pulled_back, squared_error, trust, windowed};
 use super::{Context, EdgeTrust, Method, Note, Parameter, Parameters, Reconstruction, Solution, Traits, parse};
 use crate::error::{Error, Result, SourceLoc};
-use crate::film::{Frame, Needs};
+use crate::film::{Frame, Needs, Recorded};
 use crate::image::planes::Planes;
 use crate::nn::{GradNet, Weights};
 
@@ -85,7 +85,7 @@ fn make(parameters: &Parameters) -> Result<Box<dyn Reconstruction>> {
 
 impl Reconstruction for Solver {
     fn needs(&self) -> Needs {
-        Needs { features: true, ..Needs::EDGES }
+        Needs::EDGES.with(Recorded::Features)
     }
 
     fn estimates_error(&self) -> bool {

@@ -19,7 +19,7 @@ use super::inputs::{Inputs, NET_BYTES, check_memory};
 use super::residual::{mean, noise, pulled_back, squared_error, trust, windowed};
 use super::{Context, EdgeTrust, Method, Note, Parameter, Parameters, Reconstruction, Solution, Traits, parse};
 use crate::error::{Error, Result};
-use crate::film::{Frame, Needs};
+use crate::film::{Frame, Needs, Recorded};
 use crate::image::planes::Planes;
 use crate::nn::{GradNet, Tensor, UNet, Weights};
 
@@ -123,7 +123,7 @@ impl Reconstruction for Auto {
 
 impl Reconstruction for Net {
     fn needs(&self) -> Needs {
-        Needs { features: true, ..self.frgr.needs() }
+        self.frgr.needs().with(Recorded::Features)
     }
 
     fn estimates_error(&self) -> bool {

@@ -10,7 +10,7 @@ use self::regression::regress;
 use super::inputs::{FLOOR, Inputs, check_memory, floor_variance};
 use super::{Context, Method, Parameter, Parameters, Reconstruction, Solution, Traits};
 use crate::error::Result;
-use crate::film::{Frame, Layer, Needs};
+use crate::film::{Frame, Layer, Needs, Recorded};
 use crate::image::nl_means::{self, Guide, Guides, NlmSettings};
 use crate::image::planes::Planes;
 
@@ -41,7 +41,7 @@ struct Nfor {
 
 impl Reconstruction for Nfor {
     fn needs(&self) -> Needs {
-        Needs { features: true, bins: true, ..Needs::default() }
+        Needs::NONE.with(Recorded::Features).with(Recorded::Bins)
     }
 
     fn estimates_error(&self) -> bool {
