@@ -45,8 +45,7 @@ impl fmt::Display for SourceLoc {
     }
 }
 
-/// The reason why something could not be done. The program exits with 2 after [`Error::Usage`] and
-/// [`Error::TooLittleMemory`] and with 1 after all others.
+/// The reason why something could not be done.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// The input is well formed but asks for something that Fluxion does not have.
@@ -103,6 +102,17 @@ pub enum Error {
         /// The system's or the image library's reason.
         what: String,
     },
+    /// Some outputs could not be written; the text says which, and where the image is.
+    #[error("{0}")]
+    NotWritten(String),
+    /// A run has failed of which a checkpoint holds the samples.
+    #[error("the samples are kept: `fluxion reconstruct {}` makes an image of them: {error}", path.display())]
+    Kept {
+        /// The checkpoint.
+        path: PathBuf,
+        /// Why the run has failed.
+        error: Box<Error>,
+    },
     /// A library that Fluxion calls has failed.
     #[error("{library}: {what}")]
     Backend {
@@ -119,6 +129,15 @@ fn megabytes(bytes: u64) -> u64 {
 }
 
 impl Error {
+    /// Whether the caller asked for what cannot be: the program exits with 2 then.
+    pub fn is_usage(&self) -> bool {
+        match self {
+            Self::Usage(_) | Self::TooLittleMemory { .. } => true,
+            Self::Kept { error, .. } => error.is_usage(),
+            _ => false,
+        }
+    }
+
     /// The failure of an operation on the file `path`.
     pub fn io(path: &Path, what: impl fmt::Display) -> Self {
         Self::Io { path: path.to_path_buf(), what: what.to_string() }

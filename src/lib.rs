@@ -33,7 +33,6 @@ pub mod ffi;
 pub mod error;
 pub mod files;
 pub mod math;
-pub mod mattes;
 pub mod pixels;
 
 pub mod image;
@@ -54,12 +53,14 @@ compile_error!("image files need one of the features `openimageio` and `pure-ima
 
 pub mod adaptive;
 pub mod checkpoint;
+pub mod output;
+pub mod pipeline;
+
+pub mod job;
 
 pub mod dataset;
 pub mod metrics;
 pub mod reference;
-pub mod samples;
-pub mod validate;
 
 pub mod stress;
 pub mod synthetic;

@@ -20,10 +20,7 @@ fn main() -> ExitCode {
         Err(error) if terminal::is_closed_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
             terminal::note!("error: {error:#}");
-            match error.downcast_ref() {
-                Some(Error::Usage(_) | Error::TooLittleMemory { .. }) => ExitCode::from(2),
-                _ => ExitCode::FAILURE,
-            }
+            if error.downcast_ref().is_some_and(Error::is_usage) { ExitCode::from(2) } else { ExitCode::FAILURE }
         }
     }
 }

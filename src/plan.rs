@@ -1,9 +1,7 @@
 //! The plan: what a scene and a method need, and so what is left out. Decided once, before rendering, with the reasons.
 
-use crate::error::{Error, Result};
 use crate::film::{Asker, EdgeNeed, Needs, RECORDED, Recorded, RecordedInfo};
 use crate::neighbours::Selector;
-use crate::reconstruct::{self, METHODS, Method, Reconstruction};
 use crate::scene::Scene;
 
 /// A decision: something that may be computed, and the reason why it is or is not.
@@ -72,27 +70,6 @@ impl Plan {
         let sign = |item: &Item| if item.computed { '+' } else { '-' };
         self.items.iter().map(|item| format!("{}{}", sign(item), item.name)).collect::<Vec<_>>().join(" ")
     }
-}
-
-/// The neighbours for a method and for films of so many samples, if that is known; the cross for methods that take no
-/// differences. The error says which methods take them.
-pub fn kernel(selector: Selector, method: &dyn Reconstruction, spp: Option<u32>) -> Result<Selector> {
-    if selector.is_cross() || !(method.needs_cross() || method.needs().edges.is_sampled()) {
-        return Ok(Selector::default());
-    }
-    if method.needs_cross() {
-        let takes = |method: &&Method| {
-            reconstruct::parse(method.id).is_ok_and(|made| made.needs().edges.is_sampled() && !made.needs_cross())
-        };
-        let names: Vec<_> = METHODS.iter().filter(takes).map(|method| method.id).collect();
-        let what = "this method takes differences to the four direct neighbours only; with other kernels take";
-        return Err(Error::Usage(format!("{what} --method {}", names.join(", "))));
-    }
-    let pilot = selector.pilot();
-    if let Some(spp) = spp.filter(|&spp| spp < pilot || spp <= selector.without_differences()) {
-        return Err(Error::Usage(format!("a pilot of {pilot} samples is too long for {spp}: give a smaller --pilot")));
-    }
-    Ok(selector)
 }
 
 /// Whether any scattered light can reach the camera, or the reason why none can: then all differences are zero.

@@ -2,21 +2,20 @@
 
 use std::collections::BTreeMap;
 use std::fmt;
+use std::path::Path;
 use std::sync::atomic::AtomicBool;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use super::case::Case;
 use super::record::{Record, Seconds, machine};
-use crate::adaptive::{self, AdaptiveOutcome, AdaptiveSettings, Allocator, Limits};
-use crate::error::Result;
-use crate::film::{Frame, Needs};
+use crate::adaptive::{self, Limits};
+use crate::error::{Error, Result};
 use crate::image::Image;
 use crate::math::rng;
 use crate::metrics::METRICS;
-use crate::plan::Plan;
-use crate::reconstruct::{self, Context, Reconstruction};
-use crate::reference::fingerprint;
-use crate::render::{self, Control, RenderSettings, render};
+use crate::pipeline::{self, Host, Outputs, Prepared, Recipe, Rendered, Stats, peak_bytes, reset_peak};
+use crate::reconstruct::Solution;
+use crate::render::RenderOutcome;
 
 /// Limit of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -55,25 +54,13 @@ pub struct Pilot {
     pub finish: f64,
 }
 
-/// Everything that decides a run, besides scene and method.
-#[derive(Clone, Copy)]
-struct RunSpec<'a> {
-    budget: Budget,
-    seed: u64,
-    /// Expected seconds of the reconstruction.
-    finish: f64,
-    stop: &'a AtomicBool,
-}
-
 /// A method to be run on a scene.
 pub struct Runner<'a> {
     /// The scene.
     pub case: &'a Case,
     /// The method as it was asked for.
     pub method: &'a str,
-    made: Box<dyn Reconstruction>,
-    allocator: Option<&'static dyn Allocator>,
-    needs: Needs,
+    recipe: Recipe,
 }
 
 /// A run and its image.
@@ -85,112 +72,74 @@ pub struct RunResult {
 }
 
 impl<'a> Runner<'a> {
-    /// Builds the method and decides what to render for it.
+    /// Makes sure that there is such a method.
     pub fn new(case: &'a Case, method: &'a str) -> Result<Self> {
         let (id, allocator) = adaptive::parse(method)?;
-        let made = reconstruct::parse(id)?;
-        let needs = Plan::new(&case.scene, made.needs(), Needs::default()).needs;
-        Ok(Self { case, method, made, allocator, needs })
+        // Without an allocator all pixels get the same number of samples, whatever the budget.
+        let allocator = allocator.map(|allocator| allocator.id().to_owned());
+        let outputs = Outputs { image: true, ..Outputs::default() };
+        let recipe = Recipe { allocator, outputs, ..Recipe::of_method(id) };
+        recipe.check()?;
+        Ok(Self { case, method, recipe })
     }
 
     /// Whether sampling is adaptive.
     pub fn is_adaptive(&self) -> bool {
-        self.allocator.is_some()
+        self.recipe.allocator.is_some()
     }
 
-    fn settings(&self, budget: render::Budget, seed: u64) -> RenderSettings {
-        RenderSettings { seed, ..RenderSettings::new(budget, self.needs) }
-    }
-
-    fn frame(
-        &self,
-        budget: render::Budget,
-        seed: u64,
-        stop: &AtomicBool,
-        seconds: &mut Seconds,
-    ) -> (render::RenderOutcome, Frame) {
-        let control = Control { stop, ..Control::QUIET };
-        let outcome = render(&self.case.scene, self.settings(budget, seed), &control);
-        seconds.render = outcome.elapsed.as_secs_f64();
-        let start = Instant::now();
-        let frame = outcome.film.develop();
-        seconds.develop = start.elapsed().as_secs_f64();
-        (outcome, frame)
-    }
-
-    fn finish(&self, frame: &Frame, seconds: &mut Seconds) -> Result<Image> {
-        let start = Instant::now();
-        let image = reconstruct::solve(self.made.as_ref(), frame, &Context::QUIET)?.image;
-        seconds.reconstruct = start.elapsed().as_secs_f64();
-        Ok(image)
+    /// A run within limits that is prepared, with its reconstruction taking `finish` seconds.
+    fn prepare(&self, limits: Limits, seed: u64, finish: f64) -> Result<Prepared<'a>> {
+        let recipe = Recipe { limits, seed, ..self.recipe.clone() };
+        let mut prepared = recipe.prepare(&self.case.scene, Path::new(&self.case.name))?;
+        if !self.is_adaptive() {
+            prepared.allocator = None;
+        }
+        prepared.reconstruction = Some(Duration::from_secs_f64(finish));
+        Ok(prepared)
     }
 
     /// Measures with two samples per pixel; the reconstruction twice, since the first may load libraries.
     pub fn pilot(&self) -> Result<Pilot> {
-        let mut seconds = Seconds::default();
-        let (_, frame) = self.frame(render::Budget::Spp(2), 0, &AtomicBool::new(false), &mut seconds);
-        self.finish(&frame, &mut seconds)?;
-        let first = seconds.reconstruct;
-        if first < 1.0 {
-            self.finish(&frame, &mut seconds)?;
-        }
-        let finish = seconds.develop + seconds.reconstruct.min(first);
-        Ok(Pilot { sample: seconds.render / 2.0, finish })
-    }
-
-    /// Runs with the same number of samples for every pixel. None if it was stopped.
-    fn straight(&self, spec: RunSpec, seconds: &mut Seconds) -> Result<Option<(render::RenderOutcome, Image)>> {
-        let allowed = match spec.budget {
-            Budget::Spp(spp) => render::Budget::Spp(spp),
-            Budget::Seconds(total) => render::Budget::Time(Duration::from_secs_f64((total - spec.finish).max(1e-6))),
+        let prepared = self.prepare(Limits { spp: Some(2), ..Limits::default() }, 0, 0.0)?;
+        let empty = RenderOutcome::new(&self.case.scene, prepared.settings.needs);
+        let rendered = prepared.develop(prepared.render(empty, None, &Host::QUIET), &Host::QUIET);
+        let solve = || {
+            let mut stats = Stats::default();
+            prepared.method.solve(&rendered.frame, &Host::QUIET, &mut stats)?;
+            Ok::<_, Error>(stats.seconds.reconstruct)
         };
-        let (outcome, frame) = self.frame(allowed, spec.seed, spec.stop, seconds);
-        if outcome.stopped {
-            return Ok(None);
-        }
-        let image = self.finish(&frame, seconds)?;
-        Ok(Some((outcome, image)))
+        let first = solve()?;
+        let least = if first < 1.0 { solve()?.min(first) } else { first };
+        let pipeline::Seconds { render, develop, .. } = rendered.stats.seconds;
+        Ok(Pilot { sample: render / 2.0, finish: develop + least })
     }
 
-    /// Runs with adaptive sampling. None if it was stopped.
-    fn adapt(
-        &self,
-        allocator: &dyn Allocator,
-        spec: RunSpec,
-        seconds: &mut Seconds,
-    ) -> Result<Option<(render::RenderOutcome, Image)>> {
-        let limits = match spec.budget {
+    /// Limits of a run within a budget. Of a time an adaptive run takes the reconstruction off by itself.
+    fn limits(&self, budget: Budget, finish: f64) -> Limits {
+        let time = |total: f64| if self.is_adaptive() { total } else { (total - finish).max(1e-6) };
+        match budget {
             Budget::Spp(spp) => Limits { spp: Some(spp), ..Limits::default() },
-            Budget::Seconds(total) => Limits { time: Some(Duration::from_secs_f64(total)), ..Limits::default() },
-        };
-        let settings = AdaptiveSettings {
-            render: self.settings(render::Budget::Spp(1), spec.seed),
-            method: self.made.as_ref(),
-            allocator,
-            limits,
-            reconstruction: Some(Duration::from_secs_f64(spec.finish)),
-        };
-        let control = Control { stop: spec.stop, ..Control::QUIET };
-        let outcome = adaptive::run(&self.case.scene, &settings, &control, &Context::QUIET)?;
-        let AdaptiveOutcome { render, solution, develop, reconstruct, .. } = outcome;
-        (seconds.render, seconds.develop, seconds.reconstruct) = (render.elapsed.as_secs_f64(), develop, reconstruct);
-        Ok((!render.stopped).then_some((render, solution.image)))
+            Budget::Seconds(total) => Limits { time: Some(Duration::from_secs_f64(time(total))), ..Limits::default() },
+        }
     }
 
     /// Runs with a seed, within a budget; `pilot` says how long the reconstruction is going to take. None if `stop` was
     /// set before the samples were taken.
     pub fn run(&self, budget: Budget, seed: u64, pilot: Pilot, stop: &AtomicBool) -> Result<Option<RunResult>> {
         reset_peak();
-        let mut seconds = Seconds { load: self.case.load, ..Seconds::default() };
         // Runs of different budgets do not share samples; those of different methods do.
         let salt = budget.to_string().bytes().fold(0, |hash, byte| rng::combine(hash, u64::from(byte)));
-        let spec = RunSpec { budget, seed: rng::combine(seed, salt), finish: pilot.finish, stop };
-        let made = match self.allocator {
-            Some(allocator) => self.adapt(allocator, spec, &mut seconds)?,
-            None => self.straight(spec, &mut seconds)?,
-        };
-        let Some((outcome, image)) = made else { return Ok(None) };
-        seconds.total = seconds.render + seconds.develop + seconds.reconstruct;
+        let (seed_of_run, limits) = (rng::combine(seed, salt), self.limits(budget, pilot.finish));
+        let prepared = self.prepare(limits, seed_of_run, pilot.finish)?;
+        let rendered = prepared.run_anew(&Host { stop, ..Host::QUIET })?;
+        let Rendered { render, solution: Some(Solution { image, .. }), stats, .. } = rendered else { return Ok(None) };
+        if render.stopped {
+            return Ok(None);
+        }
+        let pipeline::Seconds { render: tracing, develop, reconstruct, .. } = stats.seconds;
+        let total = tracing + develop + reconstruct;
+        let seconds = Seconds { load: self.case.load, render: tracing, develop, reconstruct, total };
         let peak_bytes = peak_bytes();
         let mut metrics = BTreeMap::new();
         for metric in METRICS {
@@ -207,12 +156,12 @@ impl<'a> Runner<'a> {
             seed,
             width: image.width,
             height: image.height,
-            fingerprint: fingerprint(&self.case.scene),
-            spp: (outcome.film.samples() as f64 / (image.width * image.height) as f64).round() as u32,
+            fingerprint: self.case.scene.fingerprint_hex(),
+            spp: stats.spp,
             seconds,
             metrics,
             negative,
-            rejected: outcome.film.rejected(),
+            rejected: stats.rejected,
             peak_bytes,
             floor: self.case.truth.floor,
             machine: machine(),
@@ -220,17 +169,4 @@ impl<'a> Runner<'a> {
         };
         Ok(Some(RunResult { record, image }))
     }
-}
-
-/// Forgets the largest memory so far, where the system can.
-fn reset_peak() {
-    // Best effort: without it later runs show the peak of earlier ones.
-    let _ = std::fs::write("/proc/self/clear_refs", "5");
-}
-
-/// Largest resident set of the process since the last reset; 0 where the system does not say.
-pub fn peak_bytes() -> u64 {
-    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
-    line.and_then(|rest| rest.trim().trim_end_matches("kB").trim().parse::<u64>().ok()).unwrap_or(0) * 1024
 }

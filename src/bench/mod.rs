@@ -7,7 +7,7 @@ mod runs;
 mod store;
 
 pub use self::case::{Case, Truth};
-pub use self::cell::{Budget, Pilot, RunResult, Runner, peak_bytes};
+pub use self::cell::{Budget, Pilot, RunResult, Runner};
 pub use self::record::{LeftOut, Record, Results, Seconds, machine};
 pub use self::runs::Runs;
 pub use self::store::Store;

@@ -8,7 +8,6 @@ use super::record::{LeftOut, Record, Results, machine};
 use crate::error::{Error, Result};
 use crate::files;
 use crate::image::{Image, io};
-use crate::reference::fingerprint;
 
 /// The folder.
 pub struct Store {
@@ -42,7 +41,7 @@ impl Store {
     /// The runs on a scene. They must be of the same version of it, measured by the same reference on the same machine.
     pub fn of<'a>(&'a self, case: &'a Case) -> Result<impl Iterator<Item = &'a Record>> {
         let (size, floor) = ((case.truth.image.width, case.truth.image.height), case.truth.floor);
-        let (fingerprint, machine) = (fingerprint(&case.scene), machine());
+        let (fingerprint, machine) = (case.scene.fingerprint_hex(), machine());
         let own = self.results.records.iter().filter(|record| record.scene == case.name);
         for record in own.clone() {
             let different = [

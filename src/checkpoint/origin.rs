@@ -17,8 +17,11 @@ use crate::scene::Scene;
 /// Everything that must agree for samples to belong together.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Origin {
-    /// Version of the program: samples of the same number are the same in one version only.
+    /// Version of the program.
     pub version: String,
+    /// Number of the samples, [`EPOCH`](crate::render::EPOCH); 0 of films that were written before there were any.
+    #[serde(default)]
+    pub epoch: u32,
     /// Name of the scene file.
     pub scene: String,
     /// [`content`] of the scene, in hexadecimal: its text, meshes and images.
@@ -125,8 +128,12 @@ impl Origin {
         let differs = |what: &str, mine: &dyn std::fmt::Display, theirs: &dyn std::fmt::Display| {
             Err(format!("is of another {what}: {mine}, not {theirs}"))
         };
-        if self.version != other.version {
-            return differs("version of fluxion", &self.version, &other.version);
+        if self.epoch != other.epoch {
+            let (mine, theirs) = (
+                format!("{} of fluxion {}", self.epoch, self.version),
+                format!("{} of {}", other.epoch, other.version),
+            );
+            return differs("epoch of samples", &mine, &theirs);
         }
         if self.content != other.content {
             let (mine, theirs) = (&self.content, &other.content);

@@ -50,17 +50,10 @@ pub struct Args {
     /// Earlier results.json, to mark improvements and regressions beyond the noise of the seeds
     #[arg(long, value_name = "FILE")]
     baseline: Option<PathBuf>,
-    /// Threads to work with (0: one per core)
-    #[arg(long, default_value_t = 0, value_parser = super::parse_threads)]
-    threads: usize,
-    /// Show no progress
-    #[arg(short, long)]
-    quiet: bool,
 }
 
 /// Runs everything, and writes the page.
 pub fn run(args: &Args) -> Result<ExitCode> {
-    super::use_threads(args.threads)?;
     let methods = methods(args.methods.as_deref())?;
     let scenes = scenes(&args.scenes)?;
     let budgets: Vec<Budget> = match args.times.is_empty() {
@@ -82,7 +75,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         names.push(case.name);
     }
     let stop = super::interrupt::stop_on_signal()?;
-    let bar = progress::bar(args.quiet);
+    let bar = progress::bar();
     let total = scenes.len() * methods.len() * budgets.len() * args.seeds as usize;
     let mut done = 0;
     for scene in &scenes {

@@ -10,7 +10,8 @@ use fluxion::image::io::{self, Picture};
 use fluxion::metrics::{self, METRICS};
 use fluxion::report::{Page, Shown, View, heat};
 
-use super::outputs::{Claims, write_json};
+use super::json;
+use super::outputs::Claims;
 use super::terminal::{note, out};
 
 /// Options of `compare`.
@@ -19,9 +20,8 @@ pub struct Args {
     /// Images to judge, and last the reference to judge them by
     #[arg(required = true, num_args = 2.., value_name = "IMAGE")]
     images: Vec<PathBuf>,
-    /// Write the figures as JSON, an object or, of several images, a list; to standard output or, as --json=FILE, a file
-    #[arg(long, value_name = "FILE", num_args = 0..=1, default_missing_value = "-", require_equals = true)]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    json: json::Args,
     /// Image of the first image's error per pixel: blue is none, red the worst hundredth
     #[arg(long, value_name = "FILE")]
     map: Option<PathBuf>,
@@ -55,7 +55,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     }
     let maps: Vec<_> = args.map.iter().cloned().collect();
     let inputs: Vec<_> = args.images.iter().map(PathBuf::as_path).collect();
-    let _claims = Claims::new(&maps, &[&args.json, &args.html], &inputs)?;
+    let _claims = Claims::new(&maps, &[&args.json.file(), &args.html], &inputs)?;
     let mut objects = Vec::new();
     for (path, image) in paths.iter().zip(&images) {
         let mut object = serde_json::Map::new();
@@ -78,10 +78,12 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         let map = map.ok_or_else(|| Error::Usage(format!("metric `{}` has no map", args.metric)))?;
         io::write_color(path, &heat(&map, None), &io::Extras::default())?;
     }
-    match (&args.json, objects.as_slice()) {
-        (None, objects) => objects.iter().zip(paths).try_for_each(|(object, path)| print(object, path))?,
-        (Some(path), [object]) => write_json(path, object)?,
-        (Some(path), all) => write_json(path, &all)?,
+    match objects.as_slice() {
+        objects if !args.json.is_wanted() => {
+            objects.iter().zip(paths).try_for_each(|(object, path)| print(object, path))?;
+        }
+        [object] => args.json.write(object)?,
+        several => args.json.write(&several)?,
     }
     if let Some(path) = &args.html {
         files::write(path, &page(paths, images, reference)?)?;

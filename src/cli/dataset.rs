@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use anyhow::{Context as _, Result, bail};
 use clap::builder::{PossibleValue, PossibleValuesParser};
-use fluxion::dataset::{self, Layout, Number, Recipe};
+use fluxion::dataset::{self, Layout, Number, Settings};
 use fluxion::error::Error;
 use fluxion::film::{EdgeNeed, Needs, RECORDED, Recorded};
 use fluxion::reconstruct;
@@ -55,12 +55,6 @@ pub struct Args {
     /// Keep the frames that are there, of the same settings, and make the rest
     #[arg(long)]
     resume: bool,
-    /// Threads to work with (0: one per core)
-    #[arg(long, default_value_t = 0, value_parser = super::parse_threads)]
-    threads: usize,
-    /// Show no progress
-    #[arg(short, long)]
-    quiet: bool,
 }
 
 /// Names of what can be stored beside the statistics of the table.
@@ -83,7 +77,7 @@ enum Arrangement {
 }
 
 impl Args {
-    fn recipe(&self) -> Result<Recipe> {
+    fn settings(&self) -> Result<Settings> {
         let (mut spp, has) = (self.spp.clone(), |name: &str| self.layers.iter().any(|part| part == name));
         spp.sort_unstable();
         spp.dedup();
@@ -107,7 +101,7 @@ impl Args {
         let edges = if has(GRADIENTS) { EdgeNeed::Sampled } else { EdgeNeed::Off };
         let layers =
             RECORDED.iter().fold(Needs { edges, ..Needs::NONE }, |needs, row| needs.with_if(row.id, has(row.name)));
-        Ok(Recipe {
+        Ok(Settings {
             spp,
             reference: self.reference,
             target: self.target.clone(),
@@ -124,12 +118,11 @@ impl Args {
 
 /// Renders frame after frame.
 pub fn run(args: &Args) -> Result<ExitCode> {
-    super::use_threads(args.threads)?;
-    let recipe = args.recipe()?;
+    let settings = args.settings()?;
     let folder = &args.output;
     std::fs::create_dir_all(folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
     let mut names: Vec<_> = args.scenes.iter().map(|path| load::name(path)).collect();
-    if recipe.layout == Layout::Oidn {
+    if settings.layout == Layout::Oidn {
         // What follows the first underscore is the kind of image there.
         names.iter_mut().for_each(|name| *name = name.replace('_', "-"));
     }
@@ -138,13 +131,13 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         bail!(Error::Usage(format!("two scenes would be the frame {}: give their files other names", names[k])));
     }
     for (k, name) in names.iter().enumerate() {
-        let there = dataset::is_there(folder, name, &recipe)?;
+        let there = dataset::is_there(folder, name, &settings)?;
         if there && !args.resume {
             bail!(Error::Usage(format!("{} has the frame {name}: keep it with --resume", folder.display())));
         }
         due.extend((!there).then_some(k));
     }
-    let (stop, bar) = (super::interrupt::stop_on_signal()?, progress::bar(args.quiet));
+    let (stop, bar) = (super::interrupt::stop_on_signal()?, progress::bar());
     let (mut there, total) = (names.len() - due.len(), due.len() as f32);
     for (done, &k) in due.iter().enumerate() {
         bar.set_message(&names[k]);
@@ -152,7 +145,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         report(0.0);
         let scene = super::scene::load(&args.scenes[k], &args.options.options())?;
         let frame = (folder.as_path(), names[k].as_str());
-        if !dataset::make((&scene, &args.scenes[k]), frame, &recipe, stop, &report)? {
+        if !dataset::make((&scene, &args.scenes[k]), frame, &settings, stop, &report)? {
             break;
         }
         there += 1;

@@ -12,7 +12,6 @@ use fluxion::metrics::METRICS;
 use fluxion::neighbours::KERNELS;
 use fluxion::plan::Plan;
 use fluxion::reconstruct::{self, METHODS, Method};
-use fluxion::reference::fingerprint;
 use fluxion::scene::load::integrator;
 use fluxion::scene::shape::Geometry;
 use fluxion::scene::{Scene, bsdf, emitter, load, sensor, shape, texture};
@@ -149,7 +148,7 @@ fn describe(scene: &Scene, method: &str) -> Result<()> {
         out!("bounds       {} to {}", bounds.lower + origin, bounds.upper + origin)?;
     }
     out!("hierarchy    Embree {major}.{minor}.{patch}")?;
-    out!("fingerprint  {}", fingerprint(scene))?;
+    out!("fingerprint  {}", scene.fingerprint_hex())?;
     out!("with method {method}:")?;
     let needs = reconstruct::parse(method)?.needs();
     let plan = Plan::new(scene, needs, Needs::default());

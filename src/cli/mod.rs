@@ -4,10 +4,12 @@ mod bench;
 mod checkpoint;
 mod compare;
 mod dataset;
+mod host;
 mod info;
 mod interrupt;
 mod job;
-mod kernel;
+mod json;
+mod machine;
 mod merge;
 mod method;
 mod outputs;
@@ -19,7 +21,6 @@ mod scene;
 mod schema;
 mod shell;
 mod statistics;
-mod stats;
 mod stored;
 mod stress;
 pub mod terminal;
@@ -28,7 +29,6 @@ mod viewer;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::sync::Once;
 use std::time::Duration;
 
 use anyhow::Result;
@@ -38,9 +38,8 @@ use clap::{Parser, Subcommand};
 #[derive(Parser)]
 #[command(name = "fluxion", version, arg_required_else_help = true, propagate_version = true)]
 pub struct Args {
-    /// How long work tells how far it is; --quiet tells nothing
-    #[arg(long, global = true, default_value = "auto", value_enum, hide_short_help = true, value_name = "STYLE")]
-    progress: progress::Style,
+    #[command(flatten)]
+    machine: machine::Args,
     #[command(subcommand)]
     command: Command,
 }
@@ -91,7 +90,7 @@ enum Command {
 /// Runs a command. The exit code is 1 for a check that failed; for work that a signal has stopped it is 75 if a checkpoint holds
 /// all of it, else 128 and the signal's number; errors are the caller's to print.
 pub fn run(args: Args) -> Result<ExitCode> {
-    progress::choose(args.progress);
+    args.machine.apply()?;
     let code = match args.command {
         Command::Render(args) => render::run(&args),
         Command::Reconstruct(args) => reconstruct::run(&args),
@@ -121,14 +120,6 @@ fn parse_size(text: &str) -> Result<(usize, usize), String> {
     ))
 }
 
-/// Threads, not so many that starting them takes longer than the work.
-fn parse_threads(text: &str) -> Result<usize, String> {
-    let threads = text.parse().ok().filter(|&threads| threads <= MAX_THREADS);
-    threads.ok_or_else(|| format!("threads are a number up to {MAX_THREADS}"))
-}
-
-const MAX_THREADS: usize = 1024;
-
 /// A positive number.
 fn parse_positive(text: &str) -> Result<f64, String> {
     let number = text.parse().ok().filter(|&number: &f64| number > 0.0 && number.is_finite());
@@ -149,12 +140,4 @@ fn parse_time(text: &str) -> Result<Duration, String> {
 fn parse_definition(text: &str) -> Result<(String, String), String> {
     let (name, value) = text.split_once('=').ok_or("a definition is written NAME=VALUE")?;
     Ok((name.to_owned(), value.to_owned()))
-}
-
-/// Makes all parallel work use this many threads (0: one per core). A command that is made of others keeps those of the first.
-fn use_threads(threads: usize) -> Result<()> {
-    static MADE: Once = Once::new();
-    let mut made = Ok(());
-    MADE.call_once(|| made = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global());
-    Ok(made?)
 }

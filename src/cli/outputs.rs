@@ -6,9 +6,6 @@ use anyhow::{Result, bail};
 use fluxion::error::Error;
 use fluxion::files;
 use fluxion::image::io;
-use serde::Serialize;
-
-use super::terminal::out;
 
 /// Removes the empty files that were claimed and never written, when the work has failed.
 pub struct Claims(Vec<PathBuf>);
@@ -37,7 +34,6 @@ impl Claims {
         for path in images {
             io::check_writable(path)?;
         }
-        let others = others.into_iter().filter(|path| !is_stdout(path));
         for path in images.iter().chain(others) {
             let path_identity = identity(path);
             if taken.contains(&path_identity) {
@@ -50,17 +46,6 @@ impl Claims {
         }
         Ok(claims)
     }
-}
-
-/// Whether a name means standard output.
-fn is_stdout(path: &Path) -> bool {
-    path.as_os_str() == "-"
-}
-
-/// Writes something as JSON to a file or, for `-`, to standard output.
-pub fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
-    let text = serde_json::to_string_pretty(value)?;
-    if is_stdout(path) { out!("{text}") } else { Ok(files::write(path, text + "\n")?) }
 }
 
 /// The same for two names of a file, whether it is there or not.

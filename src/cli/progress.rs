@@ -1,13 +1,14 @@
 //! Progress: a bar where someone is watching, lines where nobody is, or where a program reads them.
 
 use std::io::IsTerminal;
-use std::sync::{Mutex, OnceLock};
+use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::machine;
 use super::terminal::{note, out};
 
 /// How progress is shown.
@@ -24,14 +25,6 @@ pub enum Style {
     Alf,
     /// Lines that Open Job Description reads, on standard output.
     Openjd,
-}
-
-/// The style of this process.
-static STYLE: OnceLock<Style> = OnceLock::new();
-
-/// Sets the style; to be called before any progress is made.
-pub fn choose(style: Style) {
-    let _ = STYLE.set(style);
 }
 
 /// Progress of one piece of work.
@@ -65,9 +58,10 @@ pub struct Line {
 const STEPS: u64 = 1000;
 
 /// Progress that starts now.
-pub fn bar(quiet: bool) -> Progress {
+pub fn bar() -> Progress {
+    let quiet = machine::is_quiet();
     let drawn = ProgressBar::new(STEPS);
-    let style = match STYLE.get().copied().unwrap_or_default() {
+    let style = match machine::style() {
         Style::Auto if std::io::stderr().is_terminal() => None,
         Style::Auto => Some(Style::Plain),
         style => Some(style),
@@ -104,7 +98,7 @@ impl Progress {
         let share = share.clamp(0.0, 1.0);
         self.drawn.set_position((share * STEPS as f32) as u64);
         if let Some(lines) = &self.lines {
-            lines.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).tell(share);
+            lines.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).report(share);
         }
     }
 
@@ -116,7 +110,7 @@ impl Progress {
 
 impl Lines {
     /// Writes a line, if one is due.
-    fn tell(&mut self, share: f32) {
+    fn report(&mut self, share: f32) {
         let now = Instant::now();
         if now < self.next {
             return;

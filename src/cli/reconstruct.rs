@@ -8,12 +8,13 @@ use anyhow::{Result, anyhow};
 use fluxion::checkpoint;
 use fluxion::error::Error;
 use fluxion::film::{Frame, Layer, exr};
+use fluxion::pipeline::{Outputs, Stats, peak_bytes};
 use fluxion::reconstruct;
 
-use super::method;
+use super::host::hosted;
 use super::outputs::Claims;
-use super::stats::Stats;
 use super::terminal::note;
+use super::{json, method};
 
 /// Options of `reconstruct`.
 #[derive(clap::Args)]
@@ -21,7 +22,7 @@ pub struct Args {
     /// EXR file written by `fluxion render --layers`, or by Mitsuba, Cycles or pbrt with auxiliary channels; or a checkpoint
     layers: PathBuf,
     /// Image to write, by its extension: exr, hdr, pfm, tiff, png or jpg; may be given several times
-    #[arg(short, long, required = true, value_name = "FILE")]
+    #[arg(short, long, required = true, value_name = "FILE", help_heading = "Output")]
     output: Vec<PathBuf>,
     /// Samples per pixel of a file that does not say
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
@@ -31,29 +32,23 @@ pub struct Args {
     view_layer: Option<String>,
     #[command(flatten)]
     method: method::Args,
-    /// Threads to work with (0: one per core)
-    #[arg(long, default_value_t = 0, value_parser = super::parse_threads)]
-    threads: usize,
-    /// JSON file for times and memory; - is standard output
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
-    /// Show no progress
-    #[arg(short, long)]
-    quiet: bool,
+    #[command(flatten)]
+    exposure: method::Exposure,
+    #[command(flatten)]
+    json: json::Args,
 }
 
 /// The error that a layer is missing, with the methods that find all that they need.
-fn with_others(error: anyhow::Error, frame: &Frame) -> anyhow::Error {
-    let Some(Error::Missing { .. }) = error.downcast_ref() else { return error };
+fn with_others(error: Error, frame: &Frame) -> anyhow::Error {
+    let Error::Missing { .. } = error else { return error.into() };
     anyhow!("{error}. Methods that work on this file: {}", reconstruct::possible(frame).join(", "))
 }
 
 /// Reads layers, reconstructs and writes.
 pub fn run(args: &Args) -> Result<ExitCode> {
-    super::use_threads(args.threads)?;
-    let method = args.method.make()?;
-    let mut stats = Stats { method: args.method.method.clone(), ..Stats::default() };
-    let start = Instant::now();
+    let method = args.method.recipe().make()?;
+    args.method.make_folder()?;
+    let loading = Instant::now();
     let mut frame = if checkpoint::is_one(&args.layers) {
         checkpoint::load(&args.layers)?.develop()
     } else {
@@ -64,19 +59,30 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         }
         frame
     };
-    let _claims = Claims::new(&args.output, &[&args.json], &[&args.layers])?;
-    stats.seconds.load = start.elapsed().as_secs_f64();
-    stats.spp = frame.provenance.spp.parse().unwrap_or(0);
-    stats.plan.clone_from(&frame.provenance.plan);
-    stats.kernel.clone_from(&frame.provenance.kernel);
-    let sum = |layer| frame.get(layer).map_or(0.0, |image| image.data.iter().map(|&n| f64::from(n)).sum());
-    (stats.samples, stats.rejected) = (sum(Layer::Samples) as u64, sum(Layer::Rejected) as u64);
-    let solution = args.method.solve(method.as_ref(), &frame, args.quiet, &mut stats);
+    let _claims = Claims::new(&args.output, &[&args.json.file()], &[&args.layers])?;
+    let mut stats = of_frame(&frame, &method.name);
+    stats.seconds.load = loading.elapsed().as_secs_f64();
+    let solution = hosted(&[], |_| true, |host| method.solve(&frame, host, &mut stats))?;
     let solution = solution.map_err(|error| with_others(error, &frame))?;
-    frame.provenance.method.clone_from(&args.method.method);
-    method::write((&args.method, method.as_ref(), None), &args.output, &solution, &frame, &mut stats)?;
-    if let Some(path) = &args.json {
-        stats.save(path)?;
-    }
+    frame.provenance.method.clone_from(&method.name);
+    let (images, exposure, notes) = (args.output.clone(), args.exposure.exposure, args.method.notes.clone());
+    let outputs = Outputs { images, exposure, notes, ..Outputs::default() };
+    outputs.write_image(&method, (&frame, &solution), None, &mut stats)?;
+    stats.peak_bytes = peak_bytes();
+    args.json.write(&stats)?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// Everything that a frame says of the render that it is from.
+fn of_frame(frame: &Frame, method: &str) -> Stats {
+    let sum = |layer| frame.get(layer).map_or(0.0, |image| image.data.iter().map(|&n| f64::from(n)).sum());
+    Stats {
+        spp: frame.provenance.spp.parse().unwrap_or(0),
+        samples: sum(Layer::Samples) as u64,
+        rejected: sum(Layer::Rejected) as u64,
+        method: method.to_owned(),
+        plan: frame.provenance.plan.clone(),
+        kernel: frame.provenance.kernel.clone(),
+        ..Stats::default()
+    }
 }

@@ -38,12 +38,6 @@ pub struct Args {
     /// Seed of the random numbers, another one than for the images that are to be judged
     #[arg(long, default_value_t = SEED)]
     seed: u64,
-    /// Threads to work with (0: one per core)
-    #[arg(long, default_value_t = 0, value_parser = super::parse_threads)]
-    threads: usize,
-    /// Show no progress
-    #[arg(short, long)]
-    quiet: bool,
 }
 
 fn parse_floor(text: &str) -> Result<f64, String> {
@@ -53,7 +47,6 @@ fn parse_floor(text: &str) -> Result<f64, String> {
 
 /// Renders wave after wave.
 pub fn run(args: &Args) -> Result<ExitCode> {
-    super::use_threads(args.threads)?;
     let there = std::fs::metadata(&args.output).is_ok_and(|found| found.len() > 0);
     if args.output.extension().is_none_or(|extension| extension != "exr") {
         bail!(Error::io(&args.output, "references are EXR files: give it a name that ends in .exr"));
@@ -70,7 +63,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         None => Reference::new(&scene, args.seed),
     };
     let stop = super::interrupt::stop_on_signal()?;
-    let bar = progress::bar(args.quiet);
+    let bar = progress::bar();
     while let Some(spp) = next_wave(args, &reference) {
         bar.set_message(&format!("{} spp, floor {:.1e}, next wave", reference.spp, reference.floor()));
         let report = |share| bar.set(share);

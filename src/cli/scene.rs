@@ -6,10 +6,12 @@ use fluxion::error::Result;
 use fluxion::scene::sensor::Crop;
 use fluxion::scene::{Scene, load};
 
-use super::terminal::note;
+use super::host::warn;
+use super::machine;
 
 /// Options of a scene file.
 #[derive(clap::Args)]
+#[command(next_help_heading = "Scene")]
 pub struct Args {
     /// Value of a scene parameter, over its <default>
     #[arg(short = 'D', value_parser = super::parse_definition, value_name = "NAME=VALUE")]
@@ -46,6 +48,7 @@ impl Args {
             overscan: self.overscan,
             max_depth: self.max_depth,
             strict: self.strict,
+            threads: machine::threads(),
             ..load::Options::default()
         }
     }
@@ -64,10 +67,15 @@ impl Args {
     }
 }
 
-/// Loads a scene and prints the loader's warnings.
+/// Loads a scene and shows the loader's warnings.
 pub fn load(path: &Path, options: &load::Options) -> Result<Scene> {
-    let scene = load::load(path, options)?;
-    scene.warnings().iter().for_each(|warning| note!("warning: {warning}"));
+    read(|| load::load(path, options))
+}
+
+/// A scene that somebody loads, with the loader's warnings shown.
+pub fn read(load: impl FnOnce() -> Result<Scene>) -> Result<Scene> {
+    let scene = load()?;
+    scene.warnings().iter().for_each(|warning| warn(warning));
     Ok(scene)
 }
 

@@ -5,15 +5,15 @@ use std::process::ExitCode;
 use anyhow::Result;
 use fluxion::bench::Results;
 use fluxion::dataset::Manifest;
+use fluxion::job::{Job, Status};
 use fluxion::metrics::METRICS;
+use fluxion::output::samples::Description;
+use fluxion::pipeline::Stats;
 use fluxion::report::stress::Row;
-use fluxion::samples::Description;
 use schemars::{Schema, json_schema, schema_for};
 
 use super::compare::ALPHA;
-use super::job::{Job, Status};
 use super::progress::Line;
-use super::stats::Stats;
 use super::terminal::out;
 
 /// Kind of JSON.

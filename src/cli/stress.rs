@@ -4,7 +4,8 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
 
-use super::outputs::{Claims, write_json};
+use super::json;
+use super::outputs::Claims;
 use super::terminal::out;
 use anyhow::{Result, bail};
 use fluxion::error::Error;
@@ -24,20 +25,15 @@ pub struct Args {
     /// List the cases and try none
     #[arg(long)]
     list: bool,
-    /// JSON file for all figures; - is standard output
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    json: json::Args,
     /// Page for all figures
     #[arg(long, value_name = "FILE")]
     html: Option<PathBuf>,
-    /// Threads to work with (0: one per core)
-    #[arg(long, default_value_t = 0, value_parser = super::parse_threads)]
-    threads: usize,
 }
 
 /// Tries every case and prints a table.
 pub fn run(args: &Args) -> Result<ExitCode> {
-    super::use_threads(args.threads)?;
     let wanted = |name: &str| args.filter.is_empty() || args.filter.iter().any(|part| name.contains(part));
     let chosen: Vec<_> = cases().filter(|case| wanted(case.name)).collect();
     if chosen.is_empty() {
@@ -47,7 +43,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         chosen.iter().try_for_each(|case| out!("{:<20} {}", case.name, case.summary))?;
         return Ok(ExitCode::SUCCESS);
     }
-    let _claims = Claims::new(&[], &[&args.json, &args.html], &[])?;
+    let _claims = Claims::new(&[], &[&args.json.file(), &args.html], &[])?;
     let mut rows = Vec::new();
     for case in chosen {
         let start = Instant::now();
@@ -56,9 +52,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         print(&row, args.verbose)?;
         rows.push(row);
     }
-    if let Some(path) = &args.json {
-        write_json(path, &rows)?;
-    }
+    args.json.write(&rows)?;
     if let Some(path) = &args.html {
         files::write(path, page(&rows))?;
     }

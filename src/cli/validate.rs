@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use super::terminal::out;
 use anyhow::{Context, Result, bail};
 use fluxion::error::Error;
-use fluxion::validate::{self, Verdict};
+use fluxion::reference::{Verdict, check_folder};
 
 /// Options of `validate`.
 #[derive(clap::Args)]
@@ -19,14 +19,10 @@ pub struct Args {
     /// Seed to check with
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Threads to work with (0: one per core)
-    #[arg(long, default_value_t = 0, value_parser = super::parse_threads)]
-    threads: usize,
 }
 
 /// Checks every scene and prints a table.
 pub fn run(args: &Args) -> Result<ExitCode> {
-    super::use_threads(args.threads)?;
     let folders = if args.scenes.is_empty() { below(Path::new("scenes"))? } else { args.scenes.clone() };
     if folders.is_empty() {
         bail!(Error::Usage("there is no folder with a scene.xml below scenes/; name one".into()));
@@ -34,7 +30,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     out!("{:<28} {:>9} {:>9} {:>9} {:>7} {:>9}", "scene", "mean R", "mean G", "mean B", "z rms", "|z| > 4")?;
     let mut failed = 0;
     for folder in &folders {
-        let verdict = validate::check(folder, args.spp, args.seed)?;
+        let verdict = check_folder(folder, args.spp, args.seed)?;
         let Verdict { mean_ratio: [r, g, b], z_rms, outliers, passed } = verdict;
         let mark = if passed { "" } else { "  FAILED" };
         out!(

@@ -17,20 +17,23 @@ use serde::{Deserialize, Serialize};
 
 pub use self::layout::Layout;
 use self::layout::{Snapshot, Target, file};
+use crate::adaptive::Limits;
 use crate::error::{Error, Result};
 use crate::files;
 use crate::film::Needs;
 pub use crate::image::npy::Number;
 use crate::math::rng;
-use crate::plan::Plan;
-use crate::reconstruct::{self, Context, Reconstruction};
-use crate::reference::{fingerprint, floor};
-use crate::render::{Budget, Control, RenderOutcome, RenderSettings, render, resume};
+use crate::pipeline::{Host, Method, MethodRecipe, Recipe, Stats};
+use crate::reference::floor;
+use crate::render::{Budget, RenderOutcome};
 use crate::scene::Scene;
+
+/// Method whose renders take no statistics but those that are asked for.
+const PLAIN: &str = "primal";
 
 /// Settings of a set of frames, the same for all of them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Recipe {
+pub struct Settings {
     /// Numbers of samples per pixel, rising. Each has those before as its first samples.
     pub spp: Vec<u32>,
     /// Samples per pixel of the target, in two halves.
@@ -77,18 +80,18 @@ pub struct Manifest {
     /// Version of Fluxion.
     pub version: String,
     /// The settings.
-    pub recipe: Recipe,
+    pub recipe: Settings,
 }
 
 /// Whether a folder has the frame already. The error says that it was made with other settings.
-pub fn is_there(folder: &Path, name: &str, recipe: &Recipe) -> Result<bool> {
+pub fn is_there(folder: &Path, name: &str, settings: &Settings) -> Result<bool> {
     let path = folder.join(format!("{name}.json"));
     if !path.exists() {
         return Ok(false);
     }
     let text = std::fs::read_to_string(&path).map_err(|error| Error::io(&path, error))?;
     let manifest: Manifest = serde_json::from_str(&text).map_err(|error| Error::bad_data(&path, error))?;
-    if manifest.recipe == *recipe {
+    if manifest.recipe == *settings {
         return Ok(true);
     }
     Err(Error::mismatch(&path, "is of a frame with other settings: give the same ones, or another folder"))
@@ -99,45 +102,47 @@ pub fn is_there(folder: &Path, name: &str, recipe: &Recipe) -> Result<bool> {
 pub fn make(
     (scene, source): (&Scene, &Path),
     (folder, name): (&Path, &str),
-    recipe: &Recipe,
+    settings: &Settings,
     stop: &AtomicBool,
     report: &dyn Fn(f32),
 ) -> Result<bool> {
-    let methods = recipe.methods.iter().map(|text| Ok((column(text), reconstruct::parse(text)?)));
+    let methods = settings.methods.iter().map(|text| {
+        let method = MethodRecipe { notes: settings.notes, ..MethodRecipe::named(text) };
+        Ok((column(text), method.make()?))
+    });
     let methods = methods.collect::<Result<Vec<_>>>()?;
-    let last = recipe.spp.last().copied().unwrap_or_default();
-    let share = |samples: u32| samples as f32 / (recipe.reference + last).max(1) as f32;
-    let control = Control { stop, ..Control::QUIET };
-    let (stem, seed) = (folder.join(name), rng::combine(recipe.seed, scene.fingerprint()));
+    let last = settings.spp.last().copied().unwrap_or_default();
+    let share = |samples: u32| samples as f32 / (settings.reference + last).max(1) as f32;
+    let host = Host { stop, ..Host::QUIET };
+    let (stem, seed) = (folder.join(name), rng::combine(settings.seed, scene.fingerprint()));
     let target_seed = rng::combine(seed, 1);
-    let Some(target) = target(scene, target_seed, recipe, &control)? else { return Ok(false) };
-    report(share(recipe.reference));
-    let needs = methods.iter().fold(recipe.layers, |needs, (_, method)| needs.union(method.needs()));
-    let needs = Plan::new(scene, needs, recipe.layers).needs;
-    let mut outcome = RenderOutcome::new(scene, needs);
+    let Some(target) = target((scene, source), target_seed, settings, &host)? else { return Ok(false) };
+    report(share(settings.reference));
+    let statistics = methods.iter().fold(settings.layers, |needs, (_, method)| needs.union(method.made.needs()));
+    let mut prepared = Recipe { statistics, seed, ..Recipe::of_method(PLAIN) }.prepare(scene, source)?;
+    let mut outcome = RenderOutcome::new(scene, prepared.settings.needs);
     let mut channels = Vec::new();
-    for &spp in &recipe.spp {
-        let settings = RenderSettings { seed, ..RenderSettings::new(Budget::Spp(spp), needs) };
-        outcome = resume(scene, settings, &control, outcome);
+    for &spp in &settings.spp {
+        prepared.settings.budget = Budget::Spp(spp);
+        outcome = prepared.render(outcome, None, &host);
         if outcome.stopped {
             return Ok(false);
         }
         let frame = outcome.film.develop();
-        let solve = |(column, method): &(String, Box<dyn Reconstruction>)| {
-            let context = Context { notes: recipe.notes, ..Context::QUIET };
-            Ok((column.clone(), reconstruct::solve(method.as_ref(), &frame, &context)?))
+        let solve = |(column, method): &(String, Method)| {
+            Ok((column.clone(), method.solve(&frame, &host, &mut Stats::default())?))
         };
         let solutions = methods.iter().map(solve).collect::<Result<_>>()?;
-        channels =
-            recipe.layout.write(&stem, spp, &Snapshot { frame, layers: recipe.layers, solutions }, recipe.number)?;
-        report(share(recipe.reference + spp));
+        let snapshot = Snapshot { frame, layers: settings.layers, solutions };
+        channels = settings.layout.write(&stem, spp, &snapshot, settings.number)?;
+        report(share(settings.reference + spp));
     }
-    recipe.layout.write_target(&stem, &target, recipe.number)?;
+    settings.layout.write_target(&stem, &target, settings.number)?;
     let sensor = scene.sensor();
     let manifest = Manifest {
         name: name.to_owned(),
         scene: source.display().to_string(),
-        fingerprint: fingerprint(scene),
+        fingerprint: scene.fingerprint_hex(),
         width: sensor.width,
         height: sensor.height,
         seed: seed.to_string(),
@@ -145,7 +150,7 @@ pub fn make(
         floor: floor(&target.image, &target.difference),
         channels,
         version: env!("CARGO_PKG_VERSION").to_owned(),
-        recipe: recipe.clone(),
+        recipe: settings.clone(),
     };
     let path = file(&stem, ".json");
     let text = serde_json::to_string_pretty(&manifest).map_err(|error| Error::bad_data(&path, error))?;
@@ -159,17 +164,17 @@ pub fn column(method: &str) -> String {
 }
 
 /// The target, none if the render was stopped.
-fn target(scene: &Scene, seed: u64, recipe: &Recipe, control: &Control) -> Result<Option<Target>> {
-    let method = reconstruct::parse(&recipe.target)?;
-    let needs = Plan::new(scene, method.needs(), Needs::default()).needs;
+fn target((scene, source): (&Scene, &Path), seed: u64, settings: &Settings, host: &Host) -> Result<Option<Target>> {
     let mut halves = Vec::new();
     for seed in [seed, rng::combine(seed, 1)] {
-        let settings = RenderSettings { seed, ..RenderSettings::new(Budget::Spp(recipe.reference / 2), needs) };
-        let outcome = render(scene, settings, control);
+        let limits = Limits { spp: Some(settings.reference / 2), ..Limits::default() };
+        let recipe = Recipe { seed, limits, ..Recipe::of_method(&settings.target) };
+        let prepared = recipe.prepare(scene, source)?;
+        let outcome = prepared.render(RenderOutcome::new(scene, prepared.settings.needs), None, host);
         if outcome.stopped {
             return Ok(None);
         }
-        halves.push(reconstruct::solve(method.as_ref(), &outcome.film.develop(), &Context::QUIET)?.image);
+        halves.push(prepared.method.solve(&outcome.film.develop(), host, &mut Stats::default())?.image);
     }
     Ok(Some(Target::new(&halves[0], &halves[1])))
 }

@@ -329,6 +329,11 @@ impl Scene {
         self.fingerprint
     }
 
+    /// The fingerprint in hexadecimal, as headers have it.
+    pub fn fingerprint_hex(&self) -> String {
+        format!("{:016x}", self.fingerprint)
+    }
+
     /// Mesh and image files that it was read from.
     pub fn files(&self) -> &[PathBuf] {
         &self.files

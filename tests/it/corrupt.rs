@@ -6,11 +6,11 @@ use std::path::Path;
 use std::time::Instant;
 
 use crate::common::{bundled, film};
-use fluxion::bench::peak_bytes;
 use fluxion::checkpoint::{self, Origin, Run};
 use fluxion::film::{Needs, exr};
 use fluxion::image::io;
 use fluxion::math::rng;
+use fluxion::pipeline::peak_bytes;
 use fluxion::render::{RenderOutcome, Shift};
 use fluxion::scene::load::{self, mesh};
 
@@ -154,6 +154,7 @@ fn checkpoints() {
     outcome.film = film(&scene, 9, 1, Needs::ALL);
     let origin = Origin {
         version: "1".into(),
+        epoch: fluxion::render::EPOCH,
         scene: "scene.xml".into(),
         content: "0".into(),
         fingerprint: "0".into(),

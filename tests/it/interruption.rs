@@ -24,6 +24,7 @@ fn settings(spp: u32, needs: Needs) -> RenderSettings {
 fn origin(scene: &Scene, seed: u64, needs: Needs) -> Origin {
     Origin {
         version: "1".into(),
+        epoch: fluxion::render::EPOCH,
         scene: "scene.xml".into(),
         content: checkpoint::content(scene).unwrap(),
         fingerprint: "0".into(),

@@ -161,6 +161,7 @@ fn check_interrupted(kernel: &str) {
     let settings = |spp| settings(kernel, spp, 3, needs);
     let origin = Origin {
         version: "1".into(),
+        epoch: fluxion::render::EPOCH,
         scene: "scene.xml".into(),
         content: checkpoint::content(&scene).unwrap(),
         fingerprint: "0".into(),

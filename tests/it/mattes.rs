@@ -97,7 +97,7 @@ fn instances_of_a_group_are_told_apart() {
         <shape type="instance" id="right"><ref id="group"/><transform name="to_world"><translate x="0.5"/></transform></shape>
         <shape type="rectangle" id="wall"><transform name="to_world"><scale value="4"/><translate z="-1"/></transform></shape>"#,
     );
-    let mattes = fluxion::mattes::mattes(&scene, 0, 16);
+    let mattes = fluxion::output::mattes::mattes(&scene, 0, 16);
     let names = |kind: usize, pixel: usize| {
         let mut names: Vec<_> = mattes[kind].pixels[pixel].iter().map(|(name, _)| name.to_string()).collect();
         names.sort();

@@ -1,16 +1,18 @@
 //! `fluxion job plan`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::time::Duration;
 
-use anyhow::{Context, Result, bail};
-use fluxion::adaptive::ALLOCATORS;
+use anyhow::{Result, bail};
+use clap::Parser;
+use fluxion::adaptive::{ALLOCATORS, Limits};
 use fluxion::error::Error;
+use fluxion::job::{Job, Settings};
+use fluxion::pipeline::Recipe;
 
-use super::description::{Job, Settings};
-use super::schedulers;
-use crate::cli::render;
 use crate::cli::terminal::out;
+use crate::cli::{Args as CliArgs, Command, render};
 
 /// Options of `job plan`.
 #[derive(clap::Args)]
@@ -49,20 +51,32 @@ fn parse_frames(text: &str) -> Result<(u32, u32), String> {
     if frames.0 <= frames.1 && frames.1 < u32::MAX { Ok(frames) } else { Err(wrong()) }
 }
 
+/// The recipe that the options of `fluxion render` behind the -- say, and the time between checkpoints.
+fn recipe(args: &Args) -> Result<(Recipe, Duration)> {
+    // The job says of these, so they cannot be said again.
+    let said =
+        ["fluxion", "render", "scene.xml", "--spp", "1", "--first", "0", "--seed", "0", "--checkpoint", "c.ckpt"];
+    let line = said.into_iter().chain(args.options.iter().map(String::as_str));
+    match CliArgs::try_parse_from(line) {
+        Ok(CliArgs { command: Command::Render(render), .. }) => {
+            let recipe = Recipe { seed: args.seed, ..render.recipe() };
+            let limits = Limits { spp: None, ..recipe.limits };
+            Ok((Recipe { limits, ..recipe }, render.checkpoint_every()))
+        }
+        Ok(_) => bail!(Error::Usage("options of the chunks are those of `fluxion render`".into())),
+        Err(error) => bail!(Error::Usage(format!("options of the chunks: {error}"))),
+    }
+}
+
 /// Writes the plan, and what hands its chunks to schedulers.
 pub fn run(args: &Args) -> Result<ExitCode> {
-    let folder = &args.output;
-    if folder.join("job.json").exists() {
-        bail!(Error::Usage(format!("{} has a job already: take another folder", folder.display())));
-    }
-    let Args { frames, spp, chunks, seed, .. } = *args;
-    let Args { scenes, options, adaptive, .. } = args;
-    let adaptive = adaptive.as_deref();
-    let job = Job::new(&Settings { folder, scenes, frames, spp, chunks, seed, adaptive, options })?;
-    std::fs::create_dir_all(folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
-    let absolute = folder.canonicalize().map_err(|error| Error::io(folder, error))?;
-    schedulers::write(folder, &absolute, &job.rounds())?;
-    job.save()?;
+    let (recipe, checkpoint_every) = recipe(args)?;
+    let (folder, adaptive): (&Path, _) = (&args.output, args.adaptive.as_deref());
+    let Args { scenes, frames, spp, chunks, .. } = args;
+    let (frames, spp, chunks) = (*frames, *spp, *chunks);
+    let settings = Settings { folder, scenes, frames, spp, chunks, adaptive, recipe: &recipe, checkpoint_every };
+    let job = Job::new(&settings)?;
+    job.create()?;
     let second = if job.adaptive.is_some() { ", after `fluxion job allocate` each of commands-2.txt" } else { "" };
     out!("{}: {} chunks; each line of commands.txt renders one{second}", folder.display(), job.chunks())?;
     Ok(ExitCode::SUCCESS)

@@ -4,6 +4,7 @@
 pub mod reconnect;
 mod replay;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::camera::CameraSamples;
@@ -46,8 +47,9 @@ pub const SHIFTS: &[ShiftKind] = &[reconnect::SHIFT, replay::SHIFT];
 const THRESHOLD: f32 = 0.001;
 
 /// A shift mapping with its parameter.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(try_from = "(String, f32)", into = "(String, f32)")]
+#[schemars(with = "(String, f32)")]
 pub struct Shift {
     /// Position in [`SHIFTS`].
     kind: usize,

@@ -21,6 +21,8 @@ use std::path::Path;
 use std::rc::Rc;
 
 use glam::DVec3;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 pub use self::contents::CONTAINERS;
 use self::contents::Contents;
@@ -35,7 +37,8 @@ use crate::error::{Error, Result, SourceLoc};
 use crate::math::rng;
 
 /// Options that override the scene file.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
 pub struct Options {
     /// Values for the file's `$name` parameters, over its `<default>`s.
     pub parameters: Vec<(String, String)>,
@@ -53,6 +56,11 @@ pub struct Options {
     pub max_depth: Option<u32>,
     /// Whether the loader's warnings are errors.
     pub strict: bool,
+    /// Groups of emitters whose light is recorded by itself, as [`LightGroups::parse`](super::LightGroups::parse) reads them.
+    pub light_groups: Option<String>,
+    /// Whether packets evaluate materials and skip texture coordinates in faster ways where they can. Without them a render has the same bits.
+    #[serde(skip)]
+    pub fast_paths: bool,
     /// Threads for building (0: all).
     pub threads: usize,
     /// Bytes of image textures to hold in memory; files beyond them are read tile by tile as they are needed.
@@ -70,6 +78,8 @@ impl Default for Options {
             overscan: 0,
             max_depth: None,
             strict: false,
+            light_groups: None,
+            fast_paths: true,
             threads: 0,
             texture_memory: 4 << 30,
         }
@@ -141,6 +151,12 @@ fn load_tree(path: &Path, parse: &dyn Fn() -> Result<xml::Tree>, options: &Optio
             return Err(loc.unsupported(what));
         }
         scene.warnings.push(format!("{loc}: {what}"));
+    }
+    if let Some(groups) = &options.light_groups {
+        scene.group_lights(groups)?;
+    }
+    if !options.fast_paths {
+        scene.disable_fast_paths();
     }
     Ok(scene)
 }

@@ -1,5 +1,7 @@
 //! The part of a film that is rendered.
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 use std::fmt;
 
 use crate::error::{Error, Result};
@@ -9,7 +11,7 @@ use crate::scene::load::Loader;
 use crate::scene::load::props::Object;
 
 /// A rectangle of pixels of the full film.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Crop {
     /// Column of its first pixel.
     pub x: usize,

@@ -3,11 +3,11 @@
 use std::ops::Range;
 use std::path::Path;
 
-use anyhow::Result;
-use fluxion::files;
 use serde_json::json;
 
 use super::status::ranges;
+use crate::error::{Error, Result};
+use crate::files;
 
 /// Seconds from the request to stop to the kill: enough for running tiles and a checkpoint.
 const GRACE: u32 = 120;
@@ -20,7 +20,7 @@ pub fn write(folder: &Path, job: &Path, rounds: &[Range<usize>; 2]) -> Result<()
         files::write(&folder.join(name), round.clone().map(command).collect::<String>())?;
     }
     files::write(&folder.join("slurm.sh"), slurm(&quoted, rounds))?;
-    Ok(files::write(&folder.join("openjd.yaml"), openjd(job, rounds)?)?)
+    files::write(&folder.join("openjd.yaml"), openjd(job, rounds)?)
 }
 
 /// Submits an array of all chunks that are not complete, and a merge when it has ended. A chunk that was stopped is queued again. Of two
@@ -124,5 +124,6 @@ fn openjd(job: &Path, rounds: &[Range<usize>; 2]) -> Result<String> {
     }
     let template = json!({"specificationVersion": "jobtemplate-2023-09", "name": "fluxion", "steps": steps});
     // JSON is YAML.
-    Ok(serde_json::to_string_pretty(&template)? + "\n")
+    let text = serde_json::to_string_pretty(&template).map_err(|error| Error::backend("json", error))?;
+    Ok(text + "\n")
 }

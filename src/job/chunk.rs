@@ -2,17 +2,15 @@
 //! second follow those of the first of all images, and are known when these have been allocated.
 
 use std::ops::Range;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use anyhow::{Result, bail};
-use clap::Parser;
-use fluxion::checkpoint;
-use fluxion::error::Error;
-use fluxion::film::BINS;
 use serde::Serialize;
 
 use super::description::Job;
-use crate::cli::{Args, Command, render};
+use crate::checkpoint;
+use crate::error::{Error, Result};
+use crate::film::BINS;
+use crate::pipeline::Recipe;
 
 /// A part of the samples of an image.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -87,7 +85,8 @@ impl Job {
             return Ok(bounds.map(|(start, end)| Chunk { image, first: start, spp: end - start, allocated: true }));
         }
         if !first.contains(&number) {
-            bail!(Error::Usage(format!("there is no chunk {number}: there are {}, from 0 on", self.chunks())));
+            let what = format!("there is no chunk {number}: there are {}, from 0 on", self.chunks());
+            return Err(Error::Usage(what));
         }
         let (spp, chunks) = (self.adaptive.as_ref().map_or(self.spp, |first| first.spp), self.first_chunks());
         let (image, part) = (number / chunks as usize, (number % chunks as usize) as u64);
@@ -98,28 +97,15 @@ impl Job {
         Ok(Some(Chunk { image, first: start(part), spp: start(part + 1) - start(part), allocated: false }))
     }
 
-    /// The command that renders a chunk into a checkpoint.
-    pub fn render(&self, chunk: &Chunk, checkpoint: &Path) -> Result<Box<render::Args>> {
+    /// The recipe of a chunk: the job's, with its own samples and the frame's number.
+    pub fn recipe(&self, chunk: &Chunk) -> Recipe {
         let &Chunk { image, first, spp, allocated } = chunk;
-        let (scene, frame) = self.image(image);
-        let option = |name: &str, value: String| [name.to_owned(), value];
-        let mut line = vec!["fluxion".to_owned(), "render".to_owned(), scene.display().to_string()];
-        line.extend(option("--spp", spp.to_string()));
-        line.extend(option("--first", first.to_string()));
-        line.extend(option("--seed", self.seed.to_string()));
-        line.extend(option("--checkpoint", checkpoint.display().to_string()));
-        line.push("--resume".to_owned());
-        line.extend(frame.into_iter().flat_map(|frame| option("-D", format!("frame={frame}"))));
-        line.extend(self.contents.get(image).into_iter().flat_map(|known| option("--content", known.clone())));
-        if allocated {
-            line.extend(option("--goals", self.goals(image).display().to_string()));
+        let mut recipe = Recipe { first, goals: allocated.then(|| self.goals(image)), ..self.recipe.clone() };
+        recipe.limits.spp = Some(spp);
+        if let (_, Some(frame)) = self.image(image) {
+            recipe.scene.parameters.insert(0, ("frame".into(), frame.to_string()));
         }
-        line.extend(self.options.iter().cloned());
-        match Args::try_parse_from(line) {
-            Ok(Args { command: Command::Render(args), .. }) => Ok(args),
-            Ok(_) => bail!(Error::Usage("options of the chunks are those of `fluxion render`".into())),
-            Err(error) => bail!(Error::Usage(format!("options of the chunks: {error}"))),
-        }
+        recipe
     }
 
     /// The checkpoint of a complete chunk.
@@ -142,7 +128,7 @@ impl Job {
         if !path.exists() {
             return Ok(if self.unfinished(number).exists() { State::Started } else { State::Missing });
         }
-        let fits = |found: checkpoint::Summary| matches!(found.origin.runs.as_slice(), [run] if (run.seed, run.first, run.samples) == (self.seed, chunk.first, chunk.spp));
+        let fits = |found: checkpoint::Summary| matches!(found.origin.runs.as_slice(), [run] if (run.seed, run.first, run.samples) == (self.recipe.seed, chunk.first, chunk.spp));
         let whole = checkpoint::summary(&path).is_ok_and(fits) && (!verify || checkpoint::verify(&path).is_ok());
         Ok(if whole { State::Complete } else { State::Wrong })
     }

@@ -1,18 +1,26 @@
 //! The plan of a job, as `job.json` holds it, and what its second round has been allocated.
 
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
-use anyhow::{Result, bail};
-use fluxion::adaptive::{self, Allocator};
-use fluxion::error::Error;
-use fluxion::files;
-use fluxion::film::BINS;
-use fluxion::scene::load;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::schedulers;
+use crate::adaptive::{self, Allocator};
+use crate::error::{Error, Result};
+use crate::files;
+use crate::film::BINS;
+use crate::neighbours::Selector;
+use crate::pipeline::{Outputs, Recipe};
+use crate::render::EPOCH;
+use crate::scene::load;
+
 /// Version of the format of `job.json`.
-const FORMAT: u32 = 1;
+const FORMAT: u32 = 2;
+
+/// Name of the plan's file.
+const FILE: &str = "job.json";
 
 /// Least digits of a frame's number in names.
 const DIGITS: usize = 4;
@@ -21,8 +29,10 @@ const DIGITS: usize = 4;
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct Job {
     format: u32,
-    /// Version of the program: samples of the same number are the same in one version only.
+    /// Version of the program.
     version: String,
+    /// [`EPOCH`] of the samples.
+    epoch: u32,
     /// Scene files, by absolute paths.
     scenes: Vec<PathBuf>,
     /// First and last of the frames of every scene: each is an image, of the scene with `-D frame=NUMBER`.
@@ -34,10 +44,10 @@ pub struct Job {
     pub spp: u32,
     /// Chunks of every image.
     pub parts: u32,
-    /// Seed of all samples.
-    pub seed: u64,
-    /// Options of `fluxion render` for all chunks.
-    pub options: Vec<String>,
+    /// Recipe of all chunks, which differ by the numbers of their samples.
+    pub recipe: Recipe,
+    /// Time between checkpoints.
+    pub checkpoint_every: Duration,
     /// The first of two rounds, by whose samples those of the second are allocated.
     #[serde(default)]
     pub adaptive: Option<FirstRound>,
@@ -60,6 +70,32 @@ pub struct FirstRound {
     pub chunks: u32,
 }
 
+/// The part of a plan that says whether it can be read.
+#[derive(Deserialize)]
+struct Known {
+    format: u32,
+    version: String,
+    #[serde(default)]
+    epoch: u32,
+}
+
+/// Fails if a recipe is not one of a chunk, whose film is merged with others and has the samples that its plan says.
+fn check(recipe: &Recipe) -> Result<()> {
+    let refused = |what: String| Err(Error::Usage(what));
+    let Recipe { limits, allocator, goals, kernel, outputs, .. } = recipe;
+    if allocator.is_some() || limits.error.is_some() || goals.is_some() {
+        let what = "chunks cannot say how many samples they take: give --adaptive before the --, and neither --target-error nor --goals";
+        return refused(what.into());
+    }
+    if Selector::parse(kernel, recipe.pilot)?.pilot() > 0 {
+        return refused(format!("chunks cannot choose neighbours by pilots of their own: not --kernel {kernel}"));
+    }
+    if *outputs != Outputs::default() {
+        return refused("chunks write checkpoints only: `fluxion job merge` makes the images of them".into());
+    }
+    Ok(())
+}
+
 /// Everything that decides a job.
 pub struct Settings<'a> {
     /// Folder of the job.
@@ -72,12 +108,12 @@ pub struct Settings<'a> {
     pub spp: u32,
     /// Chunks of every image.
     pub chunks: u32,
-    /// Seed of all samples.
-    pub seed: u64,
     /// Name of the allocator that allocates the samples of a second round, if there are two.
     pub adaptive: Option<&'a str>,
-    /// Options of `fluxion render`.
-    pub options: &'a [String],
+    /// Recipe of all chunks; its samples are those of the job.
+    pub recipe: &'a Recipe,
+    /// Time between checkpoints.
+    pub checkpoint_every: Duration,
 }
 
 impl FirstRound {
@@ -86,7 +122,7 @@ impl FirstRound {
         let first = adaptive::first_round(spp);
         if chunks < 2 || first >= spp {
             let what = format!("two rounds take --chunks 2 and more than {first} samples a pixel, or more");
-            bail!(Error::Usage(what));
+            return Err(Error::Usage(what));
         }
         let share = u64::from(chunks) * u64::from(first) / u64::from(spp);
         let chunks = (share as u32).clamp(1, first / BINS as u32);
@@ -95,7 +131,7 @@ impl FirstRound {
 
     /// The allocator that allocates the second round.
     pub fn allocator(&self) -> Result<&'static dyn Allocator> {
-        Ok(adaptive::allocator(&self.allocator)?)
+        adaptive::allocator(&self.allocator)
     }
 }
 
@@ -103,62 +139,78 @@ impl Job {
     /// A job of so many chunks an image. Chunks are of multiples of eight samples, so that bins stay whole. The scenes of all images
     /// are loaded: what is wrong with them, or with the options, is found out before any machine works.
     pub fn new(settings: &Settings) -> Result<Self> {
-        let Settings { frames, spp, chunks: parts, seed, .. } = *settings;
+        let Settings { frames, spp, chunks: parts, checkpoint_every, .. } = *settings;
         let most = spp.div_ceil(BINS as u32);
         if parts > most {
             let what = format!("{spp} samples make at most {most} chunks of eight: give --chunks {most} or fewer");
-            bail!(Error::Usage(what));
+            return Err(Error::Usage(what));
         }
         let absolute = |path: &PathBuf| path.canonicalize().map_err(|error| Error::io(path, error));
         let scenes = settings.scenes.iter().map(absolute).collect::<Result<Vec<_>, _>>()?;
         for (k, scene) in scenes.iter().enumerate() {
             let name = load::name(scene);
             if scenes[..k].iter().any(|other| load::name(other) == name) {
-                bail!(Error::Usage(format!("two scenes are called {name}: give their files other names")));
+                let what = format!("two scenes are called {name}: give their files other names");
+                return Err(Error::Usage(what));
             }
         }
-        let adaptive = settings.adaptive.map(|allocator| FirstRound::new(allocator, spp, parts)).transpose()?;
-        let (version, options) = (env!("CARGO_PKG_VERSION").to_owned(), settings.options.to_vec());
-        let (folder, contents, allocated) = (settings.folder.to_path_buf(), Vec::new(), None);
+        check(settings.recipe)?;
         let mut job = Self {
             format: FORMAT,
-            version,
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            epoch: EPOCH,
             scenes,
             frames,
-            contents,
+            contents: Vec::new(),
             spp,
             parts,
-            seed,
-            options,
-            adaptive,
-            folder,
-            allocated,
+            recipe: settings.recipe.clone(),
+            checkpoint_every,
+            adaptive: settings.adaptive.map(|allocator| FirstRound::new(allocator, spp, parts)).transpose()?,
+            folder: settings.folder.to_path_buf(),
+            allocated: None,
         };
         for image in 0..job.images() {
             let Some(chunk) = job.chunk(job.first_round(image).start)? else { continue };
-            let render = job.render(&chunk, Path::new("chunk.ckpt"))?;
-            render.check_chunk()?;
+            let (recipe, file) = (job.recipe(&chunk), job.image(image).0);
+            let scene = recipe.load(file)?;
+            let prepared = recipe.prepare(&scene, file)?;
             if let Some(first) = &job.adaptive {
-                render.check_allocator(first.allocator()?)?;
+                adaptive::check(&*prepared.method.made, first.allocator()?.needs_error())?;
             }
-            job.contents.push(render.content()?);
+            job.contents.push(prepared.origin()?.content);
         }
         Ok(job)
     }
 
+    /// Makes the folder, with the plan and what hands its chunks to schedulers. The error says that the folder has a job already.
+    pub fn create(&self) -> Result<()> {
+        let folder = &self.folder;
+        if folder.join(FILE).exists() {
+            let what = format!("{} has a job already: take another folder", folder.display());
+            return Err(Error::Usage(what));
+        }
+        let failed = |error| Error::io(folder, format!("cannot be made: {error}"));
+        std::fs::create_dir_all(folder).map_err(failed)?;
+        let absolute = folder.canonicalize().map_err(|error| Error::io(folder, error))?;
+        schedulers::write(folder, &absolute, &self.rounds())?;
+        let text = serde_json::to_string_pretty(self).map_err(|error| Error::backend("json", error))?;
+        files::write(&folder.join(FILE), text + "\n")
+    }
+
     /// Reads the plan in a folder.
     pub fn load(folder: &Path) -> Result<Self> {
-        let path = folder.join("job.json");
+        let path = folder.join(FILE);
         let text = std::fs::read_to_string(&path).map_err(|error| Error::io(&path, error))?;
-        let mut job: Self = serde_json::from_str(&text).map_err(|error| Error::bad_data(&path, error))?;
-        if (job.format, job.version.as_str()) != (FORMAT, env!("CARGO_PKG_VERSION")) {
-            bail!(Error::mismatch(
-                &path,
-                format!("is of fluxion {}, whose samples are others: plan anew", job.version)
-            ));
+        let known: Known = serde_json::from_str(&text).map_err(|error| Error::bad_data(&path, error))?;
+        if (known.format, known.epoch) != (FORMAT, EPOCH) {
+            let what =
+                format!("is of fluxion {}, epoch {}, whose samples are others: plan anew", known.version, known.epoch);
+            return Err(Error::mismatch(&path, what));
         }
+        let mut job: Self = serde_json::from_str(&text).map_err(|error| Error::bad_data(&path, error))?;
         if job.parts == 0 || job.spp == 0 || job.images() == 0 || job.contents.len() != job.images() {
-            bail!(Error::mismatch(&path, "has no chunks"));
+            return Err(Error::mismatch(&path, "has no chunks"));
         }
         job.folder = folder.to_path_buf();
         let path = job.allocation();
@@ -170,22 +222,17 @@ impl Job {
             if allocated.len() != job.images()
                 || allocated.iter().any(|bounds| bounds.len() != second + 1 || !bounds.is_sorted())
             {
-                bail!(Error::mismatch(&path, "is of another job"));
+                return Err(Error::mismatch(&path, "is of another job"));
             }
             job.allocated = Some(allocated);
         }
         Ok(job)
     }
 
-    /// Writes the plan into its folder.
-    pub fn save(&self) -> Result<()> {
-        let text = serde_json::to_string_pretty(self)?;
-        Ok(files::write(&self.folder.join("job.json"), text + "\n")?)
-    }
-
     /// Writes the numbers of samples that divide the second rounds of all images.
-    pub fn allocate(&self, bounds: &[Vec<u32>]) -> Result<()> {
-        Ok(files::write(&self.allocation(), serde_json::to_string(bounds)? + "\n")?)
+    pub(super) fn save_allocation(&self, bounds: &[Vec<u32>]) -> Result<()> {
+        let text = serde_json::to_string(bounds).map_err(|error| Error::backend("json", error))?;
+        files::write(&self.allocation(), text + "\n")
     }
 
     /// File of the second round's division.

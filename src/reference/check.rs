@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
+use super::Reference;
 use crate::error::Result;
-use crate::reference::Reference;
 use crate::render::Control;
 use crate::scene::load;
 
@@ -28,7 +28,7 @@ pub struct Verdict {
 }
 
 /// Renders `folder/scene.xml` at the size of `folder/reference.exr` and compares.
-pub fn check(folder: &Path, spp: u32, seed: u64) -> Result<Verdict> {
+pub fn check_folder(folder: &Path, spp: u32, seed: u64) -> Result<Verdict> {
     let reference = Reference::load(&folder.join("reference.exr"))?;
     let size = (reference.image.width, reference.image.height);
     let scene = load::load(&folder.join("scene.xml"), &load::Options { size: Some(size), ..load::Options::default() })?;

@@ -1,14 +1,10 @@
-//! Times, samples and memory of a run, as one JSON object.
+//! Times, samples and memory of a run.
 
-use std::path::Path;
-
-use anyhow::Result;
-use fluxion::adaptive::Pass;
-use fluxion::render::RenderOutcome;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::outputs::write_json;
+use crate::adaptive::Pass;
+use crate::render::RenderOutcome;
 
 /// Wall-clock seconds of the stages.
 #[derive(Clone, Copy, Debug, Default, Serialize, JsonSchema)]
@@ -54,14 +50,20 @@ impl Stats {
     /// Takes over times and counts of a render.
     pub fn rendered(&mut self, outcome: &RenderOutcome) {
         self.seconds.render = outcome.elapsed.as_secs_f64();
-        let film = &outcome.film;
-        (self.samples, self.rejected) = (film.samples(), film.rejected());
-        self.spp = (self.samples as f64 / (film.width * film.height) as f64).round() as u32;
+        (self.samples, self.rejected) = (outcome.film.samples(), outcome.film.rejected());
+        self.spp = outcome.film.mean_spp().round() as u32;
     }
+}
 
-    /// Writes the object, with the peak memory as it is now.
-    pub fn save(&mut self, path: &Path) -> Result<()> {
-        self.peak_bytes = fluxion::bench::peak_bytes();
-        write_json(path, self)
-    }
+/// Forgets the largest memory so far, where the system can.
+pub fn reset_peak() {
+    // Best effort: without it later runs show the peak of earlier ones.
+    let _ = std::fs::write("/proc/self/clear_refs", "5");
+}
+
+/// Largest resident set of the process since the last reset; 0 where the system does not say.
+pub fn peak_bytes() -> u64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
+    line.and_then(|rest| rest.trim().trim_end_matches("kB").trim().parse::<u64>().ok()).unwrap_or(0) * 1024
 }

@@ -1,5 +1,7 @@
 //! References: path-traced images of many samples with their own noise, as EXR files that can be continued.
 
+mod check;
+
 use std::path::Path;
 
 use crate::error::{Error, Result};
@@ -9,6 +11,8 @@ use crate::image::io::{ImageFile, Kind, OpenImage, Pixels, read, write};
 use crate::math::rng;
 use crate::render::{Budget, Control, RenderSettings, render};
 use crate::scene::Scene;
+
+pub use self::check::{Verdict, check_folder};
 
 /// Seed of references, far from those that people choose.
 pub const SEED: u64 = 0x5eed_0000_0001;
@@ -58,7 +62,7 @@ impl Reference {
             seed,
             added: Vec::new(),
             seconds: 0.0,
-            fingerprint: fingerprint(scene),
+            fingerprint: scene.fingerprint_hex(),
         }
     }
 
@@ -239,14 +243,9 @@ fn not_one(path: &Path, why: &str) -> Error {
     Error::io(path, format!("is no reference made by `fluxion reference`: {why}"))
 }
 
-/// The scene's fingerprint as in headers.
-pub fn fingerprint(scene: &Scene) -> String {
-    format!("{:016x}", scene.fingerprint())
-}
-
 /// Fails if a reference with the fingerprint `known` is not of this scene.
 pub fn check(known: &str, path: &Path, scene: &Scene) -> Result<()> {
-    let other = fingerprint(scene);
+    let other = scene.fingerprint_hex();
     if known != other {
         let what = format!(
             "is the reference of another scene or of an older version of it (fingerprint {known}, the scene has \
