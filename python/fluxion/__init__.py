@@ -19,6 +19,7 @@ from ._dicts import load_dict
 from ._fluxion import (
     FluxionError,
     Frame,
+    Job,
     Rendering,
     Scene,
     Solution,
@@ -31,12 +32,14 @@ from ._fluxion import (
     read_image,
     reconstruct,
     render,
+    statistics,
     write_image,
 )
 
 __all__ = [
     "FluxionError",
     "Frame",
+    "Job",
     "Rendering",
     "Scene",
     "Solution",
@@ -51,6 +54,7 @@ __all__ = [
     "read_image",
     "reconstruct",
     "render",
+    "statistics",
     "write_image",
 ]
 

@@ -79,6 +79,31 @@ class Rendering(Solution):
     @property
     def plan(self) -> str: ...
 
+class Job:
+    """Renders in chunks for many machines: a folder with a plan, and a checkpoint for each chunk."""
+
+    @staticmethod
+    def plan(
+        scenes: Sequence[_Path],
+        folder: _Path,
+        *,
+        spp: int,
+        chunks: int = 1,
+        frames: tuple[int, int] | None = None,
+        adaptive: str | None = None,
+        **keywords: object,
+    ) -> Job: ...
+    @staticmethod
+    def load(folder: _Path) -> Job: ...
+    @property
+    def chunks(self) -> int: ...
+    @property
+    def images(self) -> list[str]: ...
+    def run(self, chunk: int, *, threads: int = 0, progress: _Progress | None = None) -> bool: ...
+    def allocate(self) -> dict[str, tuple[int, int]]: ...
+    def status(self, verify: bool = False) -> dict[str, int | list[int]]: ...
+    def merge(self, *, partial: bool = False, image: bool = True) -> list[PathLike[str]]: ...
+
 def load_file(
     path: _Path,
     *,
@@ -125,22 +150,27 @@ def render(
     target_error: float | None = None,
     seed: int = 0,
     first: int = 0,
+    goals: _Path | None = None,
     size: tuple[int, int] | None = None,
     method: str = ...,
     adaptive: str | None = None,
     kernel: str = "cross",
     pilot: int | None = None,
     shift: str = ...,
+    every_difference: bool = False,
     layers: bool = False,
-    bins: bool = False,
-    occlusion: bool = False,
-    position: bool = False,
-    ambient: bool = False,
     memory: int | None = None,
     notes: bool = False,
+    cryptomatte: _Path | None = None,
+    samples: _Path | None = None,
+    checkpoint: _Path | None = None,
+    checkpoint_every: float = 60.0,
+    resume: bool = False,
     threads: int = 0,
     progress: _Progress | None = None,
+    **statistics: bool,
 ) -> Rendering: ...
+def statistics() -> list[tuple[str, str]]: ...
 def reconstruct(
     frame: Frame,
     method: str = ...,

@@ -14,9 +14,10 @@ pyo3::create_exception!(
 /// The exception of an error: `ValueError` for arguments, `OSError` for files, `FluxionError` for everything else.
 pub fn raised(error: Error) -> PyErr {
     let text = error.to_string();
-    match error {
+    let reason = if let Error::Kept { error, .. } = &error { error } else { &error };
+    match reason {
         Error::Usage(_) => PyValueError::new_err(text),
-        Error::Io { .. } => PyOSError::new_err(text),
+        Error::Io { .. } | Error::NotWritten(_) => PyOSError::new_err(text),
         _ => FluxionError::new_err(text),
     }
 }

@@ -3,7 +3,9 @@
 mod array;
 mod error;
 mod frame;
+mod job;
 mod measure;
+mod recipe;
 mod reconstruct;
 mod render;
 mod scene;
@@ -18,7 +20,11 @@ mod _fluxion {
     #[pymodule_export]
     use crate::frame::Frame;
     #[pymodule_export]
+    use crate::job::Job;
+    #[pymodule_export]
     use crate::measure::{compare, methods, metrics, read_image, write_image};
+    #[pymodule_export]
+    use crate::recipe::statistics;
     #[pymodule_export]
     use crate::reconstruct::{Solution, reconstruct};
     #[pymodule_export]

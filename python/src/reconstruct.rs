@@ -1,18 +1,17 @@
 //! Reconstructions.
 
-use std::ffi::CString;
 use std::sync::Arc;
 
-use fluxion::reconstruct::{Context, DEFAULT, Note, Reconstruction, light_groups, parse, solve};
+use fluxion::pipeline::{MethodRecipe, Stats};
+use fluxion::reconstruct::{DEFAULT, Note, Reconstruction, light_groups};
 use numpy::PyArray3;
-use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::array::view;
 use crate::error::raised;
 use crate::frame::Frame;
-use crate::work::{self, Link};
+use crate::work;
 
 /// A reconstructed image.
 #[pyclass(frozen, subclass, module = "fluxion")]
@@ -82,28 +81,6 @@ fn images<'py>(owner: &Bound<'py, Solution>, notes: &[Note]) -> PyResult<Bound<'
     Ok(dict)
 }
 
-/// How a method is to work.
-#[derive(Clone, Copy)]
-pub struct Wishes {
-    /// Megabytes besides the frame.
-    pub memory: Option<u64>,
-    /// Whether intermediate images are wanted.
-    pub notes: bool,
-}
-
-impl Wishes {
-    /// The context of a method, for a closure that takes progress.
-    pub fn context<'a>(self, progress: &'a dyn Fn(&str, f32)) -> Context<'a> {
-        Context { progress, memory: self.memory.map(|megabytes| megabytes.saturating_mul(1 << 20)), notes: self.notes }
-    }
-
-    /// Reconstructs.
-    pub fn solve(self, method: &dyn Reconstruction, frame: &fluxion::Frame, link: &Link) -> fluxion::Result<Solved> {
-        let report = |stage: &str, share| link.report(stage, share);
-        Solved::new(method, frame, solve(method, frame, &self.context(&report))?)
-    }
-}
-
 /// Makes an image of a frame by a method with its parameters, such as `"frgr:levels=2"`; `fluxion.methods()` lists them.
 ///
 /// `memory` bounds what the method uses besides the frame, in megabytes; with `notes` intermediate images are kept; `threads`
@@ -119,11 +96,12 @@ pub fn reconstruct(
     threads: usize,
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Solution> {
-    let method = parse(method).map_err(raised)?;
-    for warning in method.warnings(&frame.0) {
-        PyErr::warn(py, &py.get_type::<PyUserWarning>(), &CString::new(warning.replace('\0', " "))?, 2)?;
-    }
-    let (frame, wishes) = (Arc::clone(&frame.0), Wishes { memory, notes });
-    let solved = work::run(py, threads, progress, move |link| wishes.solve(method.as_ref(), &frame, link))?;
+    let memory = memory.map(|megabytes| megabytes.saturating_mul(1 << 20));
+    let method = MethodRecipe { name: method.to_owned(), memory, notes }.make().map_err(raised)?;
+    let frame = Arc::clone(&frame.0);
+    let solved = work::run(py, threads, progress, move |link| {
+        let solution = link.hosted(|host| method.solve(&frame, host, &mut Stats::default()))?;
+        Solved::new(&*method.made, &frame, solution)
+    })?;
     Ok(Solution(solved))
 }

@@ -18,7 +18,6 @@ pub struct Scene {
     scene: Arc<fluxion::Scene>,
     source: Source,
     options: Options,
-    light_groups: Option<String>,
     /// Owner of files that were written for the scene, and that may be read again.
     _files: Option<Py<PyAny>>,
 }
@@ -51,9 +50,8 @@ impl Source {
 }
 
 /// Keyword arguments of everything that reads scenes: options, and under all other names values of the file's parameters.
-fn options(keywords: Option<&Bound<'_, PyDict>>) -> PyResult<(Options, Option<String>)> {
+pub fn options(keywords: Option<&Bound<'_, PyDict>>) -> PyResult<Options> {
     let mut options = Options::default();
-    let mut light_groups = None;
     for (name, value) in keywords.into_iter().flatten() {
         let name: String = name.extract()?;
         match name.as_str() {
@@ -69,11 +67,11 @@ fn options(keywords: Option<&Bound<'_, PyDict>>) -> PyResult<(Options, Option<St
             "strict" => options.strict = value.extract()?,
             "threads" => options.threads = value.extract()?,
             "texture_memory" => options.texture_memory = value.extract::<u64>()?.saturating_mul(1 << 20),
-            "light_groups" => light_groups = Some(value.extract()?),
+            "light_groups" => options.light_groups = Some(value.extract()?),
             _ => options.parameters.push((name, text(&value)?)),
         }
     }
-    Ok((options, light_groups))
+    Ok(options)
 }
 
 /// Reads a scene file in the format of Mitsuba 3.
@@ -89,8 +87,8 @@ fn options(keywords: Option<&Bound<'_, PyDict>>) -> PyResult<(Options, Option<St
     text_signature = "(path, *, size=None, crop=None, sensor=None, max_depth=None, strict=False, threads=0, texture_memory=4096, light_groups=None, **defines)"
 )]
 pub fn load_file(py: Python<'_>, path: PathBuf, keywords: Option<&Bound<'_, PyDict>>) -> PyResult<Scene> {
-    let (options, light_groups) = options(keywords)?;
-    load(py, Source::File(path), options, light_groups, None)
+    let options = options(keywords)?;
+    load(py, Source::File(path), options, None)
 }
 
 /// Reads a scene from the text of a scene file, with the keywords of `load_file`. Files that it names are looked for in the current
@@ -98,8 +96,8 @@ pub fn load_file(py: Python<'_>, path: PathBuf, keywords: Option<&Bound<'_, PyDi
 #[pyfunction]
 #[pyo3(signature = (xml, **keywords))]
 pub fn load_string(py: Python<'_>, xml: &str, keywords: Option<&Bound<'_, PyDict>>) -> PyResult<Scene> {
-    let (options, light_groups) = options(keywords)?;
-    load(py, Source::Text(xml.into()), options, light_groups, None)
+    let options = options(keywords)?;
+    load(py, Source::Text(xml.into()), options, None)
 }
 
 /// Reads a scene from lines of XML with the places that they are named by in messages. `files` owns files that they name.
@@ -111,10 +109,10 @@ pub fn load_lines(
     files: Py<PyAny>,
     keywords: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<Scene> {
-    let (options, light_groups) = options(keywords)?;
+    let options = options(keywords)?;
     let line = |(origin, xml): (String, String)| Line { origin: Path::new(&origin).into(), xml };
     let lines = lines.into_iter().map(line).collect();
-    load(py, Source::Lines(lines), options, light_groups, Some(files))
+    load(py, Source::Lines(lines), options, Some(files))
 }
 
 /// The element of scene files that a plugin is written as; None of one that is not known.
@@ -129,24 +127,14 @@ fn text(value: &Bound<'_, PyAny>) -> PyResult<String> {
     Ok(if value.is_instance_of::<pyo3::types::PyBool>() { text.to_lowercase() } else { text })
 }
 
-fn load(
-    py: Python<'_>,
-    source: Source,
-    options: Options,
-    light_groups: Option<String>,
-    files: Option<Py<PyAny>>,
-) -> PyResult<Scene> {
-    let (from, by, groups) = (source.clone(), options.clone(), light_groups.clone());
-    let scene = work::run(py, 0, None, move |_| {
-        let mut scene = from.load(&by)?;
-        groups.map_or(Ok(()), |groups| scene.group_lights(&groups))?;
-        Ok(scene)
-    })?;
+fn load(py: Python<'_>, source: Source, options: Options, files: Option<Py<PyAny>>) -> PyResult<Scene> {
+    let (from, by) = (source.clone(), options.clone());
+    let scene = work::run(py, 0, None, move |_| from.load(&by))?;
     let category = py.get_type::<PyUserWarning>();
     for warning in scene.warnings() {
         PyErr::warn(py, &category, &CString::new(warning.replace('\0', " "))?, 2)?;
     }
-    Ok(Scene { scene: Arc::new(scene), source, options, light_groups, _files: files })
+    Ok(Scene { scene: Arc::new(scene), source, options, _files: files })
 }
 
 #[pymethods]
@@ -192,7 +180,7 @@ impl Scene {
         match size {
             Some(size) if size != (self.width(), self.height()) => {
                 let options = Options { size: Some(size), ..self.options.clone() };
-                Ok(load(py, self.source.clone(), options, self.light_groups.clone(), None)?.scene)
+                Ok(load(py, self.source.clone(), options, None)?.scene)
             }
             _ => Ok(Arc::clone(&self.scene)),
         }
@@ -212,7 +200,7 @@ impl SceneOrPath<'_> {
         match self {
             Self::Scene(scene) => Ok((scene.get().sized(py, size)?, scene.get().source.path())),
             Self::Path(path) => {
-                let scene = load(py, Source::File(path.clone()), Options { size, ..Options::default() }, None, None)?;
+                let scene = load(py, Source::File(path.clone()), Options { size, ..Options::default() }, None)?;
                 Ok((scene.scene, path))
             }
         }

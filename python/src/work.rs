@@ -1,5 +1,6 @@
 //! Long work on a thread of its own, without the interpreter's lock, while this one listens for Ctrl-C and reports progress.
 
+use std::ffi::CString;
 use std::panic::resume_unwind;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
@@ -8,7 +9,8 @@ use std::thread;
 use std::time::Duration;
 
 use fluxion::error::{Error, Result};
-use pyo3::exceptions::{PyRuntimeError, PyValueError};
+use fluxion::pipeline::{Host, RENDERING};
+use pyo3::exceptions::{PyRuntimeError, PyUserWarning, PyValueError};
 use pyo3::prelude::*;
 
 use crate::error::raised;
@@ -26,6 +28,7 @@ pub struct Link {
     /// Set when the caller has gone away.
     pub stop: Arc<AtomicBool>,
     stage: Arc<Mutex<(String, f32)>>,
+    warnings: Arc<Mutex<Vec<String>>>,
 }
 
 impl Link {
@@ -45,6 +48,24 @@ impl Link {
             stage.clone_into(&mut now.0);
         }
         now.1 = share;
+    }
+
+    /// Does some work of the pipeline whose host is the caller.
+    pub fn hosted<T>(&self, work: impl FnOnce(&Host) -> T) -> T {
+        let progress = |stage: &str, share| match stage {
+            // Threads of a render must not unwind: they end by the flag.
+            RENDERING => self.set(stage, share),
+            _ => self.report(stage, share),
+        };
+        let warn = |text: &str| self.warnings.lock().unwrap_or_else(PoisonError::into_inner).push(text.to_owned());
+        work(&Host { stop: &self.stop, progress: &progress, warn: &warn, sinks: &[] })
+    }
+
+    /// Hands the warnings of the work to Python, whose filters may make errors of them.
+    fn warn(&self, py: Python<'_>) -> PyResult<()> {
+        let category = py.get_type::<PyUserWarning>();
+        let warnings = std::mem::take(&mut *self.warnings.lock().unwrap_or_else(PoisonError::into_inner));
+        warnings.iter().try_for_each(|text| PyErr::warn(py, &category, &CString::new(text.replace('\0', " "))?, 2))
     }
 
     fn stage(&self) -> (String, f32) {
@@ -82,7 +103,10 @@ pub fn run<T: Send + 'static>(
     loop {
         let wait = || receiver.lock().unwrap_or_else(PoisonError::into_inner).recv_timeout(PAUSE);
         match py.detach(wait) {
-            Ok(done) => return done.map_err(raised),
+            Ok(done) => {
+                link.warn(py)?;
+                return done.map_err(raised);
+            }
             Err(RecvTimeoutError::Timeout) => {
                 let report = |progress: &Bound<'_, PyAny>| progress.call1(link.stage()).map(drop);
                 let heard = py.check_signals().and_then(|()| progress.map_or(Ok(()), report));
