@@ -10,9 +10,10 @@ use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
 use fluxion::film::Needs;
+use fluxion::mitsuba;
 use fluxion::plan::Plan;
 use fluxion::render::{Budget, Control, RenderSettings, render};
-use fluxion::scene::{Scene, load};
+use fluxion::scene::Scene;
 
 const ROUNDS: usize = 5;
 const SPP: u32 = 4;
@@ -73,17 +74,16 @@ fn measure(path: &Path, pools: &[rayon::ThreadPool; 2]) -> Figures {
     let size = SIZES[usize::from(!wide)];
     let scene = load_at(path, Some(size));
     let half = load_at(path, Some((size.0 / 2, size.1 / 2)));
-    let mut general = load_at(path, Some(size));
-    general.disable_fast_paths();
-    let mut logged = load_at(path, Some((size.0 / 2, size.1 / 2)));
+    let general = load_with(path, mitsuba::Options { size: Some(size), fast_paths: false, ..Default::default() });
+    let logged_size = Some((size.0 / 2, size.1 / 2));
+    let logged = load_with(path, mitsuba::Options { size: logged_size, log_rays: true, ..Default::default() });
     let paths = Needs::default();
     let gradients = Needs::EDGES;
     let planned = Plan::new(&scene, gradients, paths).needs;
     let on = |pool: usize, scene: &Scene, spp: u32, needs: Needs| pools[pool].install(|| seconds(scene, spp, needs));
 
     // The rays are those of a smaller film: a log of all would not fit.
-    let unlogged = median((0..ROUNDS).map(|_| on(0, &logged, 4, paths)).collect());
-    logged.log_rays();
+    let unlogged = median((0..ROUNDS).map(|_| on(0, &half, 4, paths)).collect());
     on(0, &logged, 4, paths);
     let mut rays = 0;
     let replays = (0..ROUNDS).map(|_| {
@@ -120,7 +120,11 @@ fn measure(path: &Path, pools: &[rayon::ThreadPool; 2]) -> Figures {
 }
 
 fn load_at(path: &Path, size: Option<(usize, usize)>) -> Scene {
-    load::load(path, &load::Options { size, ..load::Options::default() }).expect("a scene")
+    load_with(path, mitsuba::Options { size, ..Default::default() })
+}
+
+fn load_with(path: &Path, options: mitsuba::Options) -> Scene {
+    mitsuba::load(path, &options).expect("a scene")
 }
 
 fn seconds(scene: &Scene, spp: u32, needs: Needs) -> f64 {

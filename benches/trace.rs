@@ -6,10 +6,11 @@ use divan::Bencher;
 use divan::counter::ItemsCount;
 use fluxion::film::TILE;
 use fluxion::math::lanes::{LANES, Lanes, Lanes3, Mask};
+use fluxion::mitsuba;
 use fluxion::render::{SHIFTS, Shift};
 use fluxion::render::{SampleId, sample};
+use fluxion::scene::Scene;
 use fluxion::scene::packet::{Rays, Surfaces};
-use fluxion::scene::{Scene, load};
 
 const SCENES: [&str; 3] = ["cornell-box", "glossy-metal", "door-ajar"];
 
@@ -19,7 +20,7 @@ fn main() {
 
 fn bundled(name: &str) -> Scene {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name).join("scene.xml");
-    load::load(&path, &load::Options::default()).expect("a bundled scene")
+    mitsuba::load(&path, &mitsuba::Options::default()).expect("a bundled scene")
 }
 
 /// Rays through sixteen neighbouring pixels of the middle row.

@@ -39,6 +39,8 @@ pub mod image;
 
 pub mod scene;
 
+pub mod mitsuba;
+
 pub mod film;
 pub mod neighbours;
 pub mod plan;
@@ -72,7 +74,7 @@ pub use self::error::{Error, Result};
 pub use self::film::{Frame, Layer, exr};
 pub use self::image::Image;
 pub use self::image::io::{Extras, write_color};
+pub use self::mitsuba::load;
 pub use self::reconstruct::{Context, Solution, parse as parse_method, solve};
 pub use self::render::{Budget, Control, RenderSettings, render};
 pub use self::scene::Scene;
-pub use self::scene::load::load;

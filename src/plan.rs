@@ -56,7 +56,7 @@ impl Plan {
         self
     }
 
-    /// Leaves nothing out, for comparison; to be used with [`Scene::disable_fast_paths`].
+    /// Leaves nothing out, for comparison; to be used with a scene without fast paths.
     pub fn all(scene: &Scene) -> Self {
         let mut plan = Self::new(scene, Needs::ALL, Needs::default());
         for item in &mut plan.items {

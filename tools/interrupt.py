@@ -78,7 +78,7 @@ def statistics(checkpoint):
 
 def difference(image, reference):
     """Mean squared error: zero for equal images only."""
-    report = subprocess.run([PROGRAM, "compare", image, reference, "--json"], check=True, capture_output=True)
+    report = subprocess.run([PROGRAM, "compare", image, reference, "--json", "-"], check=True, capture_output=True)
     return json.loads(report.stdout)["mse"]
 
 

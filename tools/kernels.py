@@ -67,7 +67,7 @@ def errors(args, folder, name, path, size, kernel, spp, seed):
     for weights in weights_of(kernel, args.method):
         method = "control_variate:weights=" + weights if args.method == CONTROL else args.method
         run("reconstruct", layers, "-o", image, "-q", "--method", method)
-        found[weights] = json.loads(run("compare", image, path, "--json"))
+        found[weights] = json.loads(run("compare", image, path, "--json", "-"))
     with open(stats) as file:
         return found, json.load(file)["seconds"]["render"]
 

@@ -73,7 +73,7 @@ def reference(work, shared, name):
 def errors(work, layer_file, method, reference_file):
     out, stats = f"{work}/out.exr", f"{work}/out.json"
     run("reconstruct", "-q", layer_file, "-o", out, "--method", method, "--json", stats)
-    figures = json.loads(run("compare", out, reference_file, "--json"))
+    figures = json.loads(run("compare", out, reference_file, "--json", "-"))
     figures["seconds"] = json.load(open(stats))["seconds"]["reconstruct"]
     return figures
 

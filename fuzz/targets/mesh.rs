@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use fluxion::scene::load::mesh;
+use fluxion::mitsuba::mesh;
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|bytes: &[u8]| {

@@ -4,7 +4,7 @@ use std::ffi::CString;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use fluxion::scene::load::{self, Line, Options};
+use fluxion::mitsuba::{self, Line, Options};
 use fluxion::scene::sensor::Crop;
 use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
@@ -33,9 +33,9 @@ enum Source {
 impl Source {
     fn load(&self, options: &Options) -> fluxion::Result<fluxion::Scene> {
         match self {
-            Self::File(path) => load::load(path, options),
-            Self::Text(text) => load::load_text(text, options),
-            Self::Lines(lines) => load::load_lines(lines, options),
+            Self::File(path) => mitsuba::load(path, options),
+            Self::Text(text) => mitsuba::load_text(text, options),
+            Self::Lines(lines) => mitsuba::load_lines(lines, options),
         }
     }
 
@@ -118,7 +118,7 @@ pub fn load_lines(
 /// The element of scene files that a plugin is written as; None of one that is not known.
 #[pyfunction]
 pub fn class_of(plugin: &str) -> Option<&'static str> {
-    load::class_of(plugin)
+    mitsuba::class_of(plugin)
 }
 
 /// A value as scene files have it.

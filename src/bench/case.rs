@@ -5,8 +5,9 @@ use std::time::Instant;
 
 use crate::error::{Error, Result};
 use crate::image::{Image, io};
+use crate::mitsuba;
 use crate::reference::{Reference, check, relative};
-use crate::scene::{Scene, load};
+use crate::scene::Scene;
 
 /// A reference image.
 pub struct Truth {
@@ -32,12 +33,13 @@ impl Case {
     /// Loads a scene, finds its reference and makes sure that it is one. `reference` is a file, a folder with files
     /// named after scenes, or none: then it lies beside the scene, or in a folder `references` beside the scene's.
     pub fn load(path: &Path, reference: Option<&Path>, size: Option<(usize, usize)>) -> Result<Self> {
-        let name = load::name(path);
+        let name = mitsuba::name(path);
         let file = find(path, &name, reference)?;
         let (truth, known) = truth(&file)?;
         let there = (truth.image.width, truth.image.height);
         let start = Instant::now();
-        let scene = load::load(path, &load::Options { size: size.or(Some(there)), ..load::Options::default() })?;
+        let scene =
+            mitsuba::load(path, &mitsuba::Options { size: size.or(Some(there)), ..mitsuba::Options::default() })?;
         let load = start.elapsed().as_secs_f64();
         let wanted = (scene.sensor().width, scene.sensor().height);
         if wanted != there {
@@ -54,7 +56,7 @@ impl Case {
 impl Truth {
     /// The reference of a scene, as [`Case::load`] finds it, with the scene's name.
     pub fn of(path: &Path, reference: Option<&Path>) -> Result<(String, Self)> {
-        let name = load::name(path);
+        let name = mitsuba::name(path);
         let (truth, _) = truth(&find(path, &name, reference)?)?;
         Ok((name, truth))
     }

@@ -8,8 +8,8 @@ use clap::builder::{PossibleValue, PossibleValuesParser};
 use fluxion::dataset::{self, Layout, Number, Settings};
 use fluxion::error::Error;
 use fluxion::film::{EdgeNeed, Needs, RECORDED, Recorded};
+use fluxion::mitsuba;
 use fluxion::reconstruct;
-use fluxion::scene::load;
 
 use super::terminal::out;
 use super::{progress, statistics};
@@ -121,7 +121,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let settings = args.settings()?;
     let folder = &args.output;
     std::fs::create_dir_all(folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
-    let mut names: Vec<_> = args.scenes.iter().map(|path| load::name(path)).collect();
+    let mut names: Vec<_> = args.scenes.iter().map(|path| mitsuba::name(path)).collect();
     if settings.layout == Layout::Oidn {
         // What follows the first underscore is the kind of image there.
         names.iter_mut().for_each(|name| *name = name.replace('_', "-"));

@@ -9,12 +9,14 @@ use fluxion::adaptive::ALLOCATORS;
 use fluxion::error::Error;
 use fluxion::film::{Layer, Needs};
 use fluxion::metrics::METRICS;
+use fluxion::mitsuba;
+use fluxion::mitsuba::integrator;
 use fluxion::neighbours::KERNELS;
 use fluxion::plan::Plan;
 use fluxion::reconstruct::{self, METHODS, Method};
-use fluxion::scene::load::integrator;
+use fluxion::scene::plugin::UNSUPPORTED;
 use fluxion::scene::shape::Geometry;
-use fluxion::scene::{Scene, bsdf, emitter, load, sensor, shape, texture};
+use fluxion::scene::{Scene, bsdf, emitter, sensor, shape, texture};
 
 /// Options of `info`.
 #[derive(clap::Args)]
@@ -64,7 +66,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     match &args.scene {
         Some(path) if super::stored::describe(path)? => {}
         Some(path) => {
-            let options = load::Options { sensor_optional: true, ..args.options.options() };
+            let options = mitsuba::Options { sensor_optional: true, ..args.options.options() };
             describe(&super::scene::load(path, &options)?, &args.method)?;
         }
         None if !(args.methods || args.kernels || args.layers || args.plugins || args.metrics) => {
@@ -105,7 +107,7 @@ fn plugins() -> Result<()> {
     out!("| element | type | parameters |\n|---|---|---|")?;
     let row = |class: &str, name: &str, parameters: &str| out!("| {class} | `{name}` | {parameters} |");
     shape::PLUGINS.iter().try_for_each(|plugin| row("shape", plugin.name, plugin.parameters))?;
-    load::CONTAINERS.iter().try_for_each(|(name, parameters)| row("shape", name, parameters))?;
+    mitsuba::CONTAINERS.iter().try_for_each(|(name, parameters)| row("shape", name, parameters))?;
     bsdf::PLUGINS.iter().try_for_each(|plugin| row("bsdf", plugin.name, plugin.parameters))?;
     texture::PLUGINS.iter().try_for_each(|plugin| row("texture", plugin.name, plugin.parameters))?;
     row("emitter", "area", "radiance (in a shape)")?;
@@ -113,7 +115,7 @@ fn plugins() -> Result<()> {
     sensor::PLUGINS.iter().try_for_each(|(name, parameters)| row("sensor", name, parameters))?;
     integrator::PLUGINS.iter().try_for_each(|(name, parameters)| row("integrator", name, parameters))?;
     out!("\n| left out | type | why, or what to do |\n|---|---|---|")?;
-    load::UNSUPPORTED.iter().try_for_each(|(class, name, reason)| row(class, name, reason))
+    UNSUPPORTED.iter().try_for_each(|(class, name, reason)| row(class, name, reason))
 }
 
 fn describe(scene: &Scene, method: &str) -> Result<()> {

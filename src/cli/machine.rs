@@ -4,8 +4,6 @@ use std::sync::OnceLock;
 
 use anyhow::Result;
 
-use super::progress::Style;
-
 /// Options of the machine.
 #[derive(Clone, Copy, Debug, Default, clap::Args)]
 #[command(next_help_heading = "Machine")]
@@ -19,6 +17,22 @@ pub struct Args {
     /// Format of progress reports
     #[arg(long, global = true, default_value = "auto", value_enum, hide_short_help = true, value_name = "STYLE")]
     progress: Style,
+}
+
+/// How progress is shown.
+#[derive(Clone, Copy, Debug, Default, PartialEq, clap::ValueEnum)]
+pub enum Style {
+    /// A bar on terminals, elsewhere a line every half minute.
+    #[default]
+    Auto,
+    /// A line for people every half minute, on standard error.
+    Plain,
+    /// An object a line with stage, share and seconds, on standard error.
+    Json,
+    /// Lines that Alfred, Tractor and Afanasy read, on standard output.
+    Alf,
+    /// Lines that Open Job Description reads, on standard output.
+    Openjd,
 }
 
 /// The options of this process.

@@ -8,24 +8,8 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::machine;
+use super::machine::{self, Style};
 use super::terminal::{note, out};
-
-/// How progress is shown.
-#[derive(Clone, Copy, Debug, Default, PartialEq, clap::ValueEnum)]
-pub enum Style {
-    /// A bar on terminals, elsewhere a line every half minute.
-    #[default]
-    Auto,
-    /// A line for people every half minute, on standard error.
-    Plain,
-    /// An object a line with stage, share and seconds, on standard error.
-    Json,
-    /// Lines that Alfred, Tractor and Afanasy read, on standard output.
-    Alf,
-    /// Lines that Open Job Description reads, on standard output.
-    Openjd,
-}
 
 /// Progress of one piece of work.
 pub struct Progress {

@@ -3,8 +3,9 @@
 use std::path::Path;
 
 use fluxion::error::Result;
+use fluxion::mitsuba;
+use fluxion::scene::Scene;
 use fluxion::scene::sensor::Crop;
-use fluxion::scene::{Scene, load};
 
 use super::host::warn;
 use super::machine;
@@ -39,8 +40,8 @@ pub struct Args {
 
 impl Args {
     /// The options of the loader that they are.
-    pub fn options(&self) -> load::Options {
-        load::Options {
+    pub fn options(&self) -> mitsuba::Options {
+        mitsuba::Options {
             parameters: self.define.clone(),
             sensor: self.sensor.clone(),
             size: self.size,
@@ -49,7 +50,7 @@ impl Args {
             max_depth: self.max_depth,
             strict: self.strict,
             threads: machine::threads(),
-            ..load::Options::default()
+            ..mitsuba::Options::default()
         }
     }
 
@@ -68,8 +69,8 @@ impl Args {
 }
 
 /// Loads a scene and shows the loader's warnings.
-pub fn load(path: &Path, options: &load::Options) -> Result<Scene> {
-    read(|| load::load(path, options))
+pub fn load(path: &Path, options: &mitsuba::Options) -> Result<Scene> {
+    read(|| mitsuba::load(path, options))
 }
 
 /// A scene that somebody loads, with the loader's warnings shown.

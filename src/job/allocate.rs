@@ -1,7 +1,7 @@
 //! The second round of an adaptive job: its samples are allocated by those of the first.
 
 use super::description::Job;
-use super::status::ranges;
+use super::ranges::ranges;
 use crate::adaptive::Goals;
 use crate::checkpoint;
 use crate::error::{Error, Result};

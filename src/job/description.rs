@@ -11,10 +11,10 @@ use crate::adaptive::{self, Allocator};
 use crate::error::{Error, Result};
 use crate::files;
 use crate::film::BINS;
+use crate::mitsuba;
 use crate::neighbours::Selector;
 use crate::pipeline::{Outputs, Recipe};
 use crate::render::EPOCH;
-use crate::scene::load;
 
 /// Version of the format of `job.json`.
 const FORMAT: u32 = 2;
@@ -148,8 +148,8 @@ impl Job {
         let absolute = |path: &PathBuf| path.canonicalize().map_err(|error| Error::io(path, error));
         let scenes = settings.scenes.iter().map(absolute).collect::<Result<Vec<_>, _>>()?;
         for (k, scene) in scenes.iter().enumerate() {
-            let name = load::name(scene);
-            if scenes[..k].iter().any(|other| load::name(other) == name) {
+            let name = mitsuba::name(scene);
+            if scenes[..k].iter().any(|other| mitsuba::name(other) == name) {
                 let what = format!("two scenes are called {name}: give their files other names");
                 return Err(Error::Usage(what));
             }
@@ -258,8 +258,8 @@ impl Job {
     /// Name of an image for files.
     pub fn name(&self, image: usize) -> String {
         match self.image(image) {
-            (scene, None) => load::name(scene),
-            (scene, Some(frame)) => format!("{}_{frame:0DIGITS$}", load::name(scene)),
+            (scene, None) => mitsuba::name(scene),
+            (scene, Some(frame)) => format!("{}_{frame:0DIGITS$}", mitsuba::name(scene)),
         }
     }
 

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::description::Job;
-use super::status::ranges;
+use super::ranges::ranges;
 use crate::checkpoint;
 use crate::error::{Error, Result};
 use crate::pipeline::{Host, MethodRecipe, Outputs, Stats};

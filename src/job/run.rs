@@ -11,11 +11,11 @@ use crate::pipeline::{Checkpoints, Host, Stats};
 /// How the work on a chunk has ended.
 #[derive(Clone, Debug)]
 pub enum ChunkEnd {
-    /// It was complete before.
+    /// The chunk was complete before.
     Complete,
-    /// It has all samples now.
+    /// The chunk has all samples now.
     Rendered(Chunk, Stats),
-    /// The host has stopped it; its samples are saved, to be resumed.
+    /// The host has stopped the chunk; its samples are saved, to be resumed.
     Stopped(Chunk, Stats),
 }
 

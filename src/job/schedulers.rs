@@ -5,7 +5,7 @@ use std::path::Path;
 
 use serde_json::json;
 
-use super::status::ranges;
+use super::ranges::ranges;
 use crate::error::{Error, Result};
 use crate::files;
 

@@ -12,20 +12,20 @@ use crate::error::Result;
 pub struct Status {
     /// Number of all chunks.
     pub chunks: usize,
-    /// Number of those with all samples.
+    /// Number of chunks with all samples.
     pub complete: usize,
-    /// Those with some samples.
+    /// Chunks with some samples.
     pub started: Vec<usize>,
-    /// Those without any.
+    /// Chunks without any.
     pub missing: Vec<usize>,
-    /// Those whose samples are not allocated yet.
+    /// Chunks whose samples are not allocated yet.
     pub waiting: Vec<usize>,
-    /// Those whose files are damaged, or of something else.
+    /// Chunks whose files are damaged, or of something else.
     pub wrong: Vec<usize>,
 }
 
 impl Status {
-    /// Those that are not complete and can be run.
+    /// Chunks that are not complete and can be run.
     pub fn due(&self) -> Vec<usize> {
         let mut due = [&self.started[..], &self.missing, &self.wrong].concat();
         due.sort_unstable();
@@ -47,27 +47,5 @@ impl Job {
             }
         }
         Ok(status)
-    }
-}
-
-/// Ascending numbers as schedulers take them: 3,17,200-203.
-pub fn ranges(numbers: &[usize]) -> String {
-    let runs = numbers.chunk_by(|a, b| a + 1 == *b);
-    let text = runs.map(|run| match run {
-        [one] => one.to_string(),
-        [first, .., last] => format!("{first}-{last}"),
-        [] => String::new(),
-    });
-    text.collect::<Vec<_>>().join(",")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::ranges;
-
-    #[test]
-    fn numbers_that_follow_each_other_are_ranges() {
-        assert_eq!(ranges(&[3, 17, 200, 201, 202, 203]), "3,17,200-203");
-        assert_eq!((ranges(&[]), ranges(&[0, 1])), (String::new(), "0-1".to_owned()));
     }
 }

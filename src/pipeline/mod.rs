@@ -16,6 +16,7 @@ mod prepare;
 mod recipe;
 mod run;
 mod stats;
+mod write;
 
 pub use self::checkpoints::Checkpoints;
 pub use self::host::{Host, RENDERING};

@@ -1,4 +1,4 @@
-//! Files of a render: images with layers of error, samples and lights; Cryptomatte; intermediate images.
+//! Files of a render, and its images with layers of error, samples and lights.
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -7,14 +7,11 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::method::Method;
-use super::prepare::Prepared;
-use super::run::Rendered;
 use super::stats::Stats;
 use crate::error::{Error, Result};
 use crate::film::{Frame, Layer};
 use crate::image::Image;
 use crate::image::io::{self, Extras};
-use crate::output::mattes::{self, MOST_SAMPLES};
 use crate::reconstruct::{self, Solution};
 use crate::scene::sensor::Crop;
 
@@ -36,26 +33,6 @@ pub struct Outputs {
     pub samples: Option<PathBuf>,
     /// Folder of the method's intermediate images.
     pub notes: Option<PathBuf>,
-}
-
-impl Prepared<'_> {
-    /// Writes everything but what [`Prepared::run`] has saved on the way. The error is the first of both; the image comes first, and if
-    /// it cannot be written anywhere, it goes to the folder for temporary files.
-    pub fn write(&self, rendered: &mut Rendered) -> Result<()> {
-        let Rendered { frame, solution, stats, .. } = rendered;
-        if let Some(solution) = solution {
-            self.outputs.write_image(&self.method, (frame, solution), self.scene.sensor().inner(), stats)?;
-        }
-        std::mem::replace(&mut rendered.stored, Ok(()))?;
-        let stats = &mut rendered.stats;
-        if let Some(path) = &self.outputs.cryptomatte {
-            let start = Instant::now();
-            let mattes = mattes::mattes(self.scene, self.settings.seed, stats.spp.clamp(1, MOST_SAMPLES));
-            mattes::save(path, self.scene.sensor(), &mattes, rendered.frame.provenance.attributes())?;
-            stats.seconds.write += start.elapsed().as_secs_f64();
-        }
-        Ok(())
-    }
 }
 
 impl Outputs {

@@ -10,16 +10,17 @@ use super::output::Outputs;
 use crate::adaptive::{self, Limits};
 use crate::error::Result;
 use crate::film::{Needs, Recorded};
+use crate::mitsuba;
 use crate::neighbours::Selector;
 use crate::render::Shift;
-use crate::scene::{Scene, load};
+use crate::scene::Scene;
 
 /// Everything that decides a render of a scene file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Recipe {
     /// Options that override what is in the scene file, and groups of its emitters.
-    pub scene: load::Options,
+    pub scene: mitsuba::Options,
     /// The reconstruction.
     pub method: MethodRecipe,
     /// Neighbours that paths are shifted to, as in `structure:k=4`.
@@ -74,7 +75,7 @@ pub enum Extent {
 impl Default for Recipe {
     fn default() -> Self {
         Self {
-            scene: load::Options::default(),
+            scene: mitsuba::Options::default(),
             method: MethodRecipe::default(),
             kernel: Selector::default().to_string(),
             pilot: None,
@@ -108,7 +109,7 @@ impl Recipe {
 
     /// Reads the scene.
     pub fn load(&self, file: &Path) -> Result<Scene> {
-        load::load(file, &load::Options { fast_paths: self.extent == Extent::Needed, ..self.scene.clone() })
+        mitsuba::load(file, &mitsuba::Options { fast_paths: self.extent == Extent::Needed, ..self.scene.clone() })
     }
 
     /// Statistics that are recorded for the outputs or because they are asked for.

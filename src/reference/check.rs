@@ -4,8 +4,8 @@ use std::path::Path;
 
 use super::Reference;
 use crate::error::Result;
+use crate::mitsuba;
 use crate::render::Control;
-use crate::scene::load;
 
 /// Largest departure of a channel's mean that passes, apart from its noise.
 const MEAN_TOLERANCE: f64 = 0.01;
@@ -31,7 +31,10 @@ pub struct Verdict {
 pub fn check_folder(folder: &Path, spp: u32, seed: u64) -> Result<Verdict> {
     let reference = Reference::load(&folder.join("reference.exr"))?;
     let size = (reference.image.width, reference.image.height);
-    let scene = load::load(&folder.join("scene.xml"), &load::Options { size: Some(size), ..load::Options::default() })?;
+    let scene = mitsuba::load(
+        &folder.join("scene.xml"),
+        &mitsuba::Options { size: Some(size), ..mitsuba::Options::default() },
+    )?;
     let mut own = Reference::new(&scene, seed);
     own.add_wave(&scene, spp.div_ceil(2), &Control::QUIET)?;
     let mut sums = [[0.0; 3]; 3];

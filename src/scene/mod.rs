@@ -1,16 +1,18 @@
 //! A scene: geometry in Embree, materials, emitters, a sensor. Immutable once loaded and shared by all threads;
-//! nothing here fails after [`load::load`].
+//! nothing fails after [`Scene::build`]. [`plugin`] is the wall to the files that it is read from.
 
 pub mod accel;
 pub mod bsdf;
 pub mod closure;
 pub mod emitter;
 mod light_groups;
-pub mod load;
+mod light_point;
 pub mod packet;
+pub mod plugin;
 mod ray_log;
 pub mod sensor;
 pub mod shape;
+pub mod spectrum;
 mod stats;
 pub mod surface;
 pub mod texture;
@@ -122,6 +124,19 @@ pub struct SceneDescription {
     pub warnings: Vec<String>,
 }
 
+/// How a scene is built from its description.
+#[derive(Clone, Copy, Debug)]
+pub struct BuildOptions<'a> {
+    /// Threads that build the hierarchy (0: all).
+    pub threads: usize,
+    /// Groups of emitters whose light is recorded by itself, as [`LightGroups::parse`] reads them.
+    pub light_groups: Option<&'a str>,
+    /// Whether packets evaluate materials and skip texture coordinates in faster ways where they can.
+    pub fast_paths: bool,
+    /// Whether every ray is kept, to measure the time of tracing alone.
+    pub log_rays: bool,
+}
+
 /// Geometry, materials, emitters and sensor.
 pub struct Scene {
     accel: Accel,
@@ -129,7 +144,6 @@ pub struct Scene {
     shapes: Vec<Shape>,
     instance_names: Vec<Arc<str>>,
     emitters: Vec<Box<dyn Emitter>>,
-    emitter_names: Vec<Arc<str>>,
     light_groups: LightGroups,
     /// `None` when nothing emits.
     emitter_choice: Option<Choice>,
@@ -150,9 +164,12 @@ pub struct Scene {
 
 impl Scene {
     /// Builds the acceleration structure and the emitter choice.
-    pub fn build(parts: SceneDescription, threads: usize) -> Result<Self> {
+    pub fn build(parts: SceneDescription, options: BuildOptions) -> Result<Self> {
         let SceneDescription { mut shapes, groups, mut emitters, sensor, integrator, fingerprint, files, .. } = parts;
-        let accel = Accel::build(&shapes, &groups, threads)?;
+        let mut accel = Accel::build(&shapes, &groups, options.threads)?;
+        if options.log_rays {
+            accel.log_rays();
+        }
         let instance_names = groups.iter().flat_map(|group| group.names.iter().cloned()).collect();
         shapes.extend(groups.into_iter().flat_map(|group| group.shapes));
         let numbered = (0u32..).zip(&emitters);
@@ -166,7 +183,10 @@ impl Scene {
         let chance = |index| emitter_choice.as_ref().and_then(|choice| choice.constant(index));
         let emitter_infos =
             emitters.iter().enumerate().map(|(i, emitter)| EmitterInfo::new(&**emitter, chance(i))).collect();
-        let shape_infos = shapes.iter().map(ShapeInfo::new).collect();
+        let light_groups =
+            options.light_groups.map(|text| LightGroups::parse(text, &parts.emitter_names)).transpose()?;
+        let info = |shape| if options.fast_paths { ShapeInfo::new(shape) } else { ShapeInfo::new(shape).general() };
+        let shape_infos = shapes.iter().map(info).collect();
         let environment = environments.first().copied();
         let envmap = environment.filter(|&index| emitters[index as usize].envmap().is_some());
         Ok(Self {
@@ -174,8 +194,7 @@ impl Scene {
             shapes,
             emitters,
             instance_names,
-            emitter_names: parts.emitter_names,
-            light_groups: LightGroups::default(),
+            light_groups: light_groups.unwrap_or_default(),
             emitter_choice,
             shape_infos,
             emitter_infos,
@@ -263,12 +282,6 @@ impl Scene {
         }
     }
 
-    /// Records the light of groups of emitters by themselves, from now on; [`LightGroups::parse`] has the form of the text.
-    pub fn group_lights(&mut self, text: &str) -> Result<()> {
-        self.light_groups = LightGroups::parse(text, &self.emitter_names)?;
-        Ok(())
-    }
-
     /// Groups of emitters whose light is recorded by itself.
     pub fn light_groups(&self) -> &LightGroups {
         &self.light_groups
@@ -287,6 +300,13 @@ impl Scene {
     /// Everything that the loader found to mean something else than it says.
     pub fn warnings(&self) -> &[String] {
         &self.warnings
+    }
+
+    /// The scene with one more warning.
+    #[must_use]
+    pub fn with_warning(mut self, warning: String) -> Self {
+        self.warnings.push(warning);
+        self
     }
 
     /// Path depths.
@@ -339,12 +359,7 @@ impl Scene {
         &self.files
     }
 
-    /// Keeps every ray that is traced from now on, to measure the time of tracing alone.
-    pub fn log_rays(&mut self) {
-        self.accel.log_rays();
-    }
-
-    /// Traces all kept rays again and does nothing else; returns their number and the number of hits.
+    /// Traces all rays again that [`BuildOptions::log_rays`] has kept, and does nothing else; returns their number and the number of hits.
     pub fn replay_rays(&self) -> (usize, usize) {
         self.accel.replay_rays()
     }

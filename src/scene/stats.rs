@@ -35,12 +35,4 @@ impl Scene {
             uniform_meshes: self.emitter_infos.iter().filter(|info| info.mesh_light.is_some()).count(),
         }
     }
-
-    /// Makes packets evaluate every material through its trait and look up all texture coordinates. Renders the same bits,
-    /// slower.
-    pub fn disable_fast_paths(&mut self) {
-        for info in &mut self.shape_infos {
-            (info.closes, info.closure, info.uv) = (false, None, true);
-        }
-    }
 }

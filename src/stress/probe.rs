@@ -6,9 +6,10 @@ use super::Checks;
 use super::frame::{average, not_finite};
 use crate::error::Result;
 use crate::film::{Film, Frame, Layer, Needs, Recorded};
+use crate::mitsuba;
 use crate::reconstruct::{Context, parse, solve};
 use crate::render::{Budget, Control, RenderSettings, SHIFTS, Shift, render};
-use crate::scene::{Scene, load};
+use crate::scene::Scene;
 
 /// Size of the images: more than one tile, and one that is cut off.
 const SIZE: (usize, usize) = (20, 14);
@@ -74,7 +75,7 @@ impl Probe {
             {}</scene>"#,
             elements.join("\n")
         );
-        Ok(Self { scene: load::load_text(&text, &load::Options::default())?, spp })
+        Ok(Self { scene: mitsuba::load_text(&text, &mitsuba::Options::default())?, spp })
     }
 
     fn film(&self, run: u64, needs: Needs, shift: Shift) -> Film {

@@ -6,9 +6,9 @@ use assert_cmd::Command;
 use fluxion::bench::Results;
 use fluxion::error::Error;
 use fluxion::image::io::{Kind, read, write};
+use fluxion::mitsuba;
 use fluxion::reference::Reference;
 use fluxion::render::Control;
-use fluxion::scene::load;
 
 fn scene(name: &str) -> String {
     format!("{}/scenes/{name}/scene.xml", env!("CARGO_MANIFEST_DIR"))
@@ -39,8 +39,8 @@ fn results(folder: &Path) -> Results {
 
 #[test]
 fn a_reference_in_waves_is_the_one_in_a_single_go() {
-    let options = load::Options { size: Some((20, 16)), ..load::Options::default() };
-    let scene = load::load(Path::new(&scene("cornell-box")), &options).unwrap();
+    let options = mitsuba::Options { size: Some((20, 16)), ..mitsuba::Options::default() };
+    let scene = mitsuba::load(Path::new(&scene("cornell-box")), &options).unwrap();
     let make = |waves: &[u32]| {
         let mut reference = Reference::new(&scene, 5);
         for &spp in waves {

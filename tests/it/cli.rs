@@ -84,7 +84,7 @@ fn figures_come_as_json_with_the_promised_keys() {
         "{plan}"
     );
     let output =
-        fluxion(folder.path()).args(["compare", "a.exr", "a.exr", "--json", "--map", "map.png"]).output().unwrap();
+        fluxion(folder.path()).args(["compare", "a.exr", "a.exr", "--json", "-", "--map", "map.png"]).output().unwrap();
     let figures: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
     for (key, value) in [("relmse", 0.0), ("smape", 0.0), ("flip", 0.0), ("mse", 0.0), ("mean_ratio", 1.0)] {
         assert_eq!(figures[key].as_f64(), Some(value), "{key}");

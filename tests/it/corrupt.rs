@@ -10,9 +10,9 @@ use fluxion::checkpoint::{self, Origin, Run};
 use fluxion::film::{Needs, exr};
 use fluxion::image::io;
 use fluxion::math::rng;
+use fluxion::mitsuba::{self, mesh};
 use fluxion::pipeline::peak_bytes;
 use fluxion::render::{RenderOutcome, Shift};
-use fluxion::scene::load::{self, mesh};
 
 const FILES: u64 = 1000;
 
@@ -93,7 +93,7 @@ fn asset(name: &str) -> Vec<u8> {
 #[test]
 #[ignore = "run by `readers_survive_damaged_files`, in a process of its own"]
 fn scenes() {
-    let options = load::Options { threads: 1, size: Some((4, 4)), ..load::Options::default() };
+    let options = mitsuba::Options { threads: 1, size: Some((4, 4)), ..mitsuba::Options::default() };
     for name in ["cornell-box", "unit/textures", "unit/principled", "unit/instances"] {
         let folder = crate::common::root().join("scenes").join(name);
         let text = fs::read_to_string(folder.join("scene.xml")).unwrap();
@@ -103,7 +103,7 @@ fn scenes() {
         check(&name.replace('/', "-"), text.as_bytes(), |bytes| {
             let Ok(text) = std::str::from_utf8(bytes) else { return false };
             // Any scene that is taken can be traced.
-            load::load_text(text, &options).is_ok_and(|scene| film(&scene, 1, 1, Needs::ALL).samples() > 0)
+            mitsuba::load_text(text, &options).is_ok_and(|scene| film(&scene, 1, 1, Needs::ALL).samples() > 0)
         });
     }
 }

@@ -4,8 +4,9 @@ use std::fs;
 
 use fluxion::Result;
 use fluxion::math::{Vec3, vec3};
+use fluxion::mitsuba;
 use fluxion::scene::packet::{Rays, Surfaces};
-use fluxion::scene::{Ray, Scene, load};
+use fluxion::scene::{Ray, Scene};
 
 use crate::common::sensor;
 
@@ -19,7 +20,7 @@ fn try_scene(plugin: &str, points: &str, more: &str) -> Result<Scene> {
     let shape = format!("<shape type=\"{plugin}\"><string name=\"filename\" value=\"curves.txt\"/>{more}</shape>");
     let text = format!("<scene version=\"3.0.0\">{}{shape}</scene>", sensor("0,0,20", 8, 8));
     fs::write(folder.path().join("scene.xml"), text).unwrap();
-    load::load(&folder.path().join("scene.xml"), &load::Options::default())
+    mitsuba::load(&folder.path().join("scene.xml"), &mitsuba::Options::default())
 }
 
 fn scene(plugin: &str, more: &str) -> Scene {

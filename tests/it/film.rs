@@ -1,9 +1,10 @@
 //! Films and files: threads do not matter, nothing is lost on disk, an independent reader sees the same.
 
-use crate::common::{bundled, film, sensor};
+use crate::common::{bundled, film, root, sensor};
 use fluxion::film::{Frame, Layer, Needs, Recorded, exr as layers};
 use fluxion::image::Image;
 use fluxion::math::Rgb;
+use fluxion::mitsuba;
 use fluxion::plan::Plan;
 
 fn on_threads(threads: usize) -> fluxion::film::Film {
@@ -82,11 +83,12 @@ fn half_of_the_directions_are_open_beside_a_wall_and_all_of_them_in_the_open() {
 fn what_is_left_out_changes_no_bit_of_what_is_not() {
     let names = ["cornell-box", "unit/rough-plastic", "unit/dielectric", "unit/bump", "unit/environment", "unit/lens"];
     for name in names.into_iter().chain(["unit/instances", "unit/mask", "unit/sphere-light"]) {
-        let mut scene = bundled(name, (24, 18));
+        let scene = bundled(name, (24, 18));
         let (paths, edges) = (Needs::default(), Needs::EDGES);
         let planned = [paths, edges].map(|needs| film(&scene, 9, 3, needs).develop());
-        scene.disable_fast_paths();
-        let all = film(&scene, 9, 3, Plan::all(&scene).needs).develop();
+        let options = mitsuba::Options { size: Some((24, 18)), fast_paths: false, ..mitsuba::Options::default() };
+        let general = mitsuba::load(&root().join("scenes").join(name).join("scene.xml"), &options).unwrap();
+        let all = film(&general, 9, 3, Plan::all(&general).needs).develop();
         for planned in planned {
             for layer in Layer::all().filter(|&layer| planned.get(layer).is_some()) {
                 assert_eq!(planned.get(layer), all.get(layer), "{name} {layer:?}");

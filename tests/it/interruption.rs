@@ -503,8 +503,8 @@ fn textures_that_vanish_while_rendering_are_reported() {
         common::sensor("0,0,4", 16, 16)
     );
     let text = format!("<scene version=\"3.0.0\">{body}</scene>");
-    let options = fluxion::scene::load::Options { texture_memory: 0, ..Default::default() };
-    let scene = fluxion::scene::load::load_text(&text, &options).unwrap();
+    let options = fluxion::mitsuba::Options { texture_memory: 0, ..Default::default() };
+    let scene = fluxion::mitsuba::load_text(&text, &options).unwrap();
     // Opened and looked at, but most of it not read yet.
     let length = fs::metadata(&texture).unwrap().len();
     fs::OpenOptions::new().write(true).open(&texture).unwrap().set_len(length / 8).unwrap();

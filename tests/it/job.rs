@@ -105,7 +105,7 @@ fn chunks_that_are_stopped_killed_damaged_or_foreign_are_told_and_healed() {
     }
     expect(at, &["job", "run", "j", "0"], 0, "");
     expect(at, &["job", "run", "j", "1"], 0, "");
-    expect(at, &["job", "status", "j", "--json"], 0, "\"complete\": 2");
+    expect(at, &["job", "status", "j", "--json", "-"], 0, "\"complete\": 2");
     let (zero, one) = (at.join("j/0000.ckpt"), at.join("j/0001.ckpt"));
     let kept = fs::read(&one).unwrap();
     // A copy of another chunk, half a file, and a flipped bit, which only its bytes tell.

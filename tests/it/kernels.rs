@@ -8,11 +8,11 @@ use assert_cmd::Command;
 use fluxion::checkpoint::{self, Origin, Run};
 use fluxion::film::{EdgeNeed, EdgeParts, Edges, Film, Kernel, Layer, Needs, Recorded};
 use fluxion::image::Image;
+use fluxion::mitsuba::{self, Options};
 use fluxion::neighbours::Selector;
 use fluxion::reconstruct::{self, Context};
 use fluxion::render::{Budget, Control, RenderOutcome, RenderSettings, Shift, render, resume};
 use fluxion::scene::Scene;
-use fluxion::scene::load::{self, Options};
 
 use crate::common::{bundled, check_zero, film, root};
 
@@ -71,7 +71,7 @@ const RUNS: u64 = 16;
 /// Differences across every edge of a kernel minus those of independent images have mean zero.
 fn check_unbiased(name: &str, kernel: &str, shift: &str, max_depth: Option<u32>) {
     let options = Options { size: Some((20, 16)), max_depth, ..Options::default() };
-    let scene = load::load(&root().join("scenes").join(name).join("scene.xml"), &options).unwrap();
+    let scene = mitsuba::load(&root().join("scenes").join(name).join("scene.xml"), &options).unwrap();
     let shift = Shift::named(shift).unwrap();
     // Neighbours of the first run, for all: runs with neighbours of their own could not be compared edge by edge.
     let first = kernel_film(&scene, RenderSettings { shift, ..settings(kernel, 4, 99, NEEDS) });
@@ -279,7 +279,7 @@ fn a_depth_given_is_that_of_the_scene() {
     let with_depth = |depth: Option<u32>| {
         let path = root().join("scenes/cornell-box/scene.xml");
         let options = Options { size: Some((16, 16)), max_depth: depth, ..Options::default() };
-        load::load(&path, &options).unwrap()
+        mitsuba::load(&path, &options).unwrap()
     };
     let brightness = |depth| {
         let frame = film(&with_depth(depth), 32, 1, Needs::default()).develop();

@@ -5,7 +5,8 @@ use std::fs;
 
 use fluxion::film::Needs;
 use fluxion::math::{Frame, Vec3, vec3};
-use fluxion::scene::{Scene, load};
+use fluxion::mitsuba;
+use fluxion::scene::Scene;
 
 use crate::common::film;
 use crate::wild::pixels;
@@ -79,7 +80,7 @@ fn scene(lamp: &Lamp, direction: Vec3) -> Scene {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("lamp.obj"), format!("{CORNERS}{mesh}")).unwrap();
     fs::write(folder.path().join("scene.xml"), xml).unwrap();
-    load::load(&folder.path().join("scene.xml"), &load::Options::default()).unwrap()
+    mitsuba::load(&folder.path().join("scene.xml"), &mitsuba::Options::default()).unwrap()
 }
 
 /// Light that the small square reflects: the integral of L cos²/(π r²) over the lamp, times its reflectance.

@@ -6,11 +6,11 @@ use fluxion::adaptive::{self, AdaptiveSettings, Limits};
 use fluxion::film::{Frame, Layer, Needs, Recorded, exr};
 use fluxion::image::Image;
 use fluxion::image::io::{Pixels, read};
+use fluxion::mitsuba::{Options, load_text};
 use fluxion::plan::Plan;
 use fluxion::reconstruct::{self, Context, METHODS, Reconstruction, light_groups, parse, solve};
 use fluxion::render::{Budget, Control, RenderSettings, render};
 use fluxion::scene::Scene;
-use fluxion::scene::load::{Options, load_text};
 
 use crate::cli::fluxion;
 
@@ -33,9 +33,7 @@ const GROUPS: &str = "key=*_left,rest";
 
 fn room(parameters: &[(&str, &str)]) -> Scene {
     let parameters = parameters.iter().map(|(name, value)| ((*name).to_owned(), (*value).to_owned())).collect();
-    let mut scene = load_text(ROOM, &Options { parameters, ..Options::default() }).unwrap();
-    scene.group_lights(GROUPS).unwrap();
-    scene
+    load_text(ROOM, &Options { parameters, light_groups: Some(GROUPS.into()), ..Options::default() }).unwrap()
 }
 
 fn frame(scene: &Scene, needs: Needs, spp: u32) -> Frame {
@@ -129,8 +127,7 @@ fn adaptive_renders_and_hidden_emitters_have_groups() {
         r#"<integer name="max_depth""#,
         r#"<boolean name="hide_emitters" value="true"/><integer name="max_depth""#,
     );
-    let mut scene = load_text(&hidden, &Options::default()).unwrap();
-    scene.group_lights(GROUPS).unwrap();
+    let scene = load_text(&hidden, &Options { light_groups: Some(GROUPS.into()), ..Options::default() }).unwrap();
     let frame = frame(&scene, Needs::default(), 4);
     assert!(apart(frame.get(Layer::Color).unwrap(), frame.lights.iter().map(|lights| &lights.color)) < 1e-5);
     assert_eq!(mean(&frame.lights[0].direct), [0.0; 3]);

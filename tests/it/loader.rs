@@ -3,8 +3,9 @@
 use crate::common::{film, scene, sensor, try_scene};
 use fluxion::film::{Layer, Needs, Recorded};
 use fluxion::math::{vec2, vec3};
+use fluxion::mitsuba;
+use fluxion::scene::Ray;
 use fluxion::scene::emitter::Position;
-use fluxion::scene::{Ray, load};
 use proptest::prelude::*;
 
 fn message(body: &str) -> String {
@@ -173,7 +174,7 @@ fn with_file(name: &str, plugin: &str, bytes: &[u8]) -> fluxion::error::Result<f
     );
     let path = folder.path().join("scene.xml");
     std::fs::write(&path, body).unwrap();
-    load::load(&path, &load::Options::default())
+    mitsuba::load(&path, &mitsuba::Options::default())
 }
 
 #[test]
@@ -223,7 +224,7 @@ proptest! {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("scene.xml");
         std::fs::write(&path, bytes).unwrap();
-        let _ = load::load(&path, &load::Options::default());
+        let _ = mitsuba::load(&path, &mitsuba::Options::default());
     }
 }
 
@@ -241,7 +242,7 @@ fn files_of_older_versions_say_the_same() {
             <texture name="diffuseReflectance" type="checkerboard"><float name="uscale" value="4"/></texture></bsdf></shape>
     </scene>"##;
     std::fs::write(&path, text).unwrap();
-    let scene = load::load(&path, &load::Options::default()).unwrap();
+    let scene = mitsuba::load(&path, &mitsuba::Options::default()).unwrap();
     assert_eq!((scene.integrator().max_depth, scene.shapes().len()), (3, 2));
     let hit = scene.intersect(scene.sensor().ray(vec2(1.8, 0.7), vec2(0.5, 0.5))).unwrap();
     assert!((scene.bsdf(&hit).albedo(&hit).x - 0.2158605).abs() < 1e-4);

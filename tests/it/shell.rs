@@ -104,11 +104,11 @@ fn schemas_are_those_of_what_is_written() {
     let line = progress.lines().find(|line| line.starts_with('{')).unwrap_or_else(|| panic!("no line: {progress}"));
     for (kind, text) in [
         ("render", adaptive),
-        ("compare", output(at, &["compare", "a.exr", "a.exr", "--json"])),
+        ("compare", output(at, &["compare", "a.exr", "a.exr", "--json", "-"])),
         ("bench", file("b/results.json")),
         ("stress", file("stress.json")),
         ("job", file("j/job.json")),
-        ("status", output(at, &["job", "status", "j", "--json"])),
+        ("status", output(at, &["job", "status", "j", "--json", "-"])),
         ("dataset", file("d/cornell-box.json")),
         ("samples", file("s/samples.json")),
         ("progress", line.to_owned()),

@@ -6,7 +6,8 @@ use std::fs;
 use crate::common::film;
 use exr::prelude::{AnyChannel, AnyChannels, FlatSamples, Image, SmallVec, WritableImage, f16};
 use fluxion::film::{Layer, Needs};
-use fluxion::scene::{Scene, load};
+use fluxion::mitsuba;
+use fluxion::scene::Scene;
 
 /// Columns and rows of all images.
 const SIZE: (usize, usize) = (4, 2);
@@ -126,7 +127,7 @@ fn view(name: &str, bytes: &[u8], raw: bool, around: bool, extra: &str) -> fluxi
         name=\"height\" value=\"4\"/></film></sensor>{body}</scene>"
     );
     fs::write(folder.path().join("scene.xml"), text).unwrap();
-    load::load(&folder.path().join("scene.xml"), &load::Options::default())
+    mitsuba::load(&folder.path().join("scene.xml"), &mitsuba::Options::default())
 }
 
 /// The one colour of a view.

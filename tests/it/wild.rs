@@ -7,21 +7,22 @@ use std::path::{Path, PathBuf};
 use crate::common::{film, sensor};
 use fluxion::Result;
 use fluxion::film::{Film, Layer, Needs, Recorded};
-use fluxion::scene::{Scene, load};
+use fluxion::mitsuba;
+use fluxion::scene::Scene;
 
 /// A scene of some files, of which `scene.xml` is the first to be read.
-fn scene_of(files: &[(&str, &[u8])], options: &load::Options) -> Result<Scene> {
+fn scene_of(files: &[(&str, &[u8])], options: &mitsuba::Options) -> Result<Scene> {
     let folder = tempfile::tempdir().unwrap();
     for (name, bytes) in files {
         let path = folder.path().join(name);
         fs::create_dir_all(path.parent().unwrap()).unwrap();
         fs::write(path, bytes).unwrap();
     }
-    load::load(&folder.path().join("scene.xml"), options)
+    mitsuba::load(&folder.path().join("scene.xml"), options)
 }
 
 fn try_text(text: &str) -> Result<Scene> {
-    scene_of(&[("scene.xml", text.as_bytes())], &load::Options::default())
+    scene_of(&[("scene.xml", text.as_bytes())], &mitsuba::Options::default())
 }
 
 fn text(text: &str) -> Scene {
@@ -63,7 +64,7 @@ fn any_encoding_and_what_pugixml_forgives_is_read() {
     let blank = format!("\n\n<?xml version=\"1.0\"?>\n{plain}\nthe end");
     let odd = file("3.0.0", &format!("<!-- -- a -- b ---->{}", BALL.replace("sphere\"", "sphere\" id=\"a & b\"")));
     for bytes in [plain.as_bytes(), &utf16, &latin1, blank.as_bytes(), odd.as_bytes()] {
-        let scene = scene_of(&[("scene.xml", bytes)], &load::Options::default()).unwrap();
+        let scene = scene_of(&[("scene.xml", bytes)], &mitsuba::Options::default()).unwrap();
         near(centre_and_corner(&scene).0, [0.5; 3], "the ball");
     }
 }
@@ -92,9 +93,9 @@ fn included_files_may_hold_one_object() {
     let main = file("3.0.0", "<include filename=\"ball.xml\"/><emitter type=\"constant\"/>");
     let files =
         [("part.xml", part), ("ball.xml", ball), ("scene.xml", &main)].map(|(name, text)| (name, text.as_bytes()));
-    let scene = scene_of(&files, &load::Options::default()).unwrap();
+    let scene = scene_of(&files, &mitsuba::Options::default()).unwrap();
     near(centre_and_corner(&scene).0, [0.25; 3], "the ball");
-    let message = scene_of(&[("scene.xml", ball.as_bytes())], &load::Options::default()).err().unwrap().to_string();
+    let message = scene_of(&[("scene.xml", ball.as_bytes())], &mitsuba::Options::default()).err().unwrap().to_string();
     assert!(message.contains("starts with <scene>, not <shape>"), "{message}");
 }
 
@@ -106,7 +107,7 @@ fn folders_of_paths_come_before_the_scenes_own_the_last_one_first() {
         let main =
             file("3.0.0", &format!("{paths}<shape type=\"obj\"><string name=\"filename\" value=\"m.obj\"/></shape>"));
         let files = [("m.obj", &own), ("a/m.obj", &first), ("b/m.obj", &second), ("scene.xml", &main)];
-        let scene = scene_of(&files.map(|(name, text)| (name, text.as_bytes())), &load::Options::default()).unwrap();
+        let scene = scene_of(&files.map(|(name, text)| (name, text.as_bytes())), &mitsuba::Options::default()).unwrap();
         let frame = film(&scene, 1, 1, Needs::NONE.with(Recorded::Features)).develop();
         let found = frame.get(Layer::Depth).unwrap().rgb(8, 8).x;
         assert!((found - depth).abs() < 0.05, "{paths}: {found}");
@@ -142,7 +143,7 @@ fn covered(name: &str, mesh: &[u8]) -> f32 {
     let main = flat(&format!(
         "<shape type=\"{plugin}\"><string name=\"filename\" value=\"{name}\"/><emitter type=\"area\"/></shape>"
     ));
-    let scene = scene_of(&[(name, mesh), ("scene.xml", main.as_bytes())], &load::Options::default()).unwrap();
+    let scene = scene_of(&[(name, mesh), ("scene.xml", main.as_bytes())], &mitsuba::Options::default()).unwrap();
     pixels(&film(&scene, 64, 1, Needs::default())).iter().map(|pixel| pixel[0]).sum::<f32>() / 64.0
 }
 
@@ -372,7 +373,7 @@ fn what_means_something_else_is_said_and_strictness_makes_it_an_error() {
             "{body}: {:?}",
             scene.warnings()
         );
-        let strict = load::Options { strict: true, ..load::Options::default() };
+        let strict = mitsuba::Options { strict: true, ..mitsuba::Options::default() };
         let message = scene_of(&[("scene.xml", all.as_bytes())], &strict).err().unwrap().to_string();
         assert!(message.contains(expected), "{message}");
     }
@@ -388,7 +389,7 @@ fn any_sensor_can_be_chosen_and_none_is_needed_to_look_at_a_scene() {
     let second = sensor("0,0,9", 8, 4).replace("<sensor ", "<sensor id=\"far\" ");
     let all = file("3.0.0", &format!("{second}{BALL}"));
     let choose = |sensor: Option<&str>| {
-        let options = load::Options { sensor: sensor.map(Into::into), ..load::Options::default() };
+        let options = mitsuba::Options { sensor: sensor.map(Into::into), ..mitsuba::Options::default() };
         scene_of(&[("scene.xml", all.as_bytes())], &options)
     };
     for (sensor, width) in [(None, 16), (Some("0"), 16), (Some("1"), 8), (Some("far"), 8)] {
@@ -399,7 +400,7 @@ fn any_sensor_can_be_chosen_and_none_is_needed_to_look_at_a_scene() {
     assert_ne!(choose(None).unwrap().fingerprint(), choose(Some("far")).unwrap().fingerprint());
     let bare = format!("<scene version=\"3.0.0\">{BALL}</scene>");
     assert!(try_text(&bare).is_err());
-    let options = load::Options { sensor_optional: true, ..load::Options::default() };
+    let options = mitsuba::Options { sensor_optional: true, ..mitsuba::Options::default() };
     assert_eq!(scene_of(&[("scene.xml", bare.as_bytes())], &options).unwrap().sensors().len(), 0);
 }
 
@@ -411,7 +412,7 @@ fn included_files_find_what_lies_beside_them() {
         let main = file("3.0.0", main);
         let mut all: Vec<(&str, &[u8])> = files.iter().map(|(name, text)| (*name, text.as_bytes())).collect();
         all.push(("scene.xml", main.as_bytes()));
-        centre_and_corner(&scene_of(&all, &load::Options::default()).unwrap()).0[0]
+        centre_and_corner(&scene_of(&all, &mitsuba::Options::default()).unwrap()).0[0]
     };
     let lamp = lamp.to_owned();
     let one = of("<include filename=\"parts/l.xml\"/>", &[("parts/l.xml", lamp.clone()), ("s.spd", flat("1"))]);
@@ -499,7 +500,7 @@ fn values_are_taken_as_files_write_them_or_refused_with_a_reason() {
     }
     let empty = file("3.0.0", "<shape type=\"obj\"><string name=\"filename\" value=\"m.obj\"/></shape>");
     let scene =
-        scene_of(&[("m.obj", b"no mesh\n"), ("scene.xml", empty.as_bytes())], &load::Options::default()).unwrap();
+        scene_of(&[("m.obj", b"no mesh\n"), ("scene.xml", empty.as_bytes())], &mitsuba::Options::default()).unwrap();
     assert!(scene.warnings()[0].contains("the obj file has no faces"), "{:?}", scene.warnings());
     let mean = covered("m.obj", b"v -1 -1 0\rv 1 -1 0\rv 1 1 0\rf 1 2 3\r");
     assert!((mean - 0.5).abs() < 0.01, "lines of old Macs: {mean}");
@@ -515,8 +516,8 @@ fn shared_examples_have_their_values() {
     let Some(folder) = examples() else { return };
     let load = |name: &str, define: &[(&str, &str)]| -> Scene {
         let parameters = define.iter().map(|(name, value)| ((*name).into(), (*value).into())).collect();
-        let options = load::Options { parameters, ..load::Options::default() };
-        load::load(&folder.join(name), &options).unwrap_or_else(|error| panic!("{error}"))
+        let options = mitsuba::Options { parameters, ..mitsuba::Options::default() };
+        mitsuba::load(&folder.join(name), &options).unwrap_or_else(|error| panic!("{error}"))
     };
     let everywhere = |name: &str, define: &[(&str, &str)], expected: [f32; 3]| {
         pixels(&film(&load(name, define), 16, 1, Needs::default()))
@@ -557,8 +558,8 @@ fn shared_examples_have_their_values() {
         }
     }
     assert_eq!(load("legacy-06/gpt.xml", &[]).integrator().max_depth, 12);
-    let options = load::Options { parameters: vec![("angel".into(), "30".into())], ..load::Options::default() };
-    let message = load::load(&folder.join("unused-definition/scene.xml"), &options).err().unwrap().to_string();
+    let options = mitsuba::Options { parameters: vec![("angel".into(), "30".into())], ..mitsuba::Options::default() };
+    let message = mitsuba::load(&folder.join("unused-definition/scene.xml"), &options).err().unwrap().to_string();
     assert!(message.contains("no parameter `angel`; it has `angle`"), "{message}");
     let alpha = load("alpha/scene.xml", &[]);
     let frame = film(&alpha, 64, 1, Needs::NONE.with_if(Recorded::Alpha, alpha.sensor().wants_alpha())).develop();
@@ -576,7 +577,7 @@ fn left_over_properties_of_old_files_are_warnings() {
         near(centre_and_corner(&scene).0, [1.0; 3], version);
         let warned = scene.warnings().iter().filter(|warning| warning.contains("`dielectric` has no property `alpha`"));
         assert_eq!(warned.count(), 1, "{:?}", scene.warnings());
-        let strict = load::Options { strict: true, ..load::Options::default() };
+        let strict = mitsuba::Options { strict: true, ..mitsuba::Options::default() };
         assert!(scene_of(&[("scene.xml", file(version, body).as_bytes())], &strict).is_err());
     }
     for version in ["2.1.0", "3.0.0"] {
@@ -599,7 +600,7 @@ fn ascii_meshes_are_words_between_white_space() {
     let header = header.replace("ascii 1.0", "ascii 1.0\ncomment before end_header there are more lines");
     let load = |body: &str| {
         let mesh = format!("{header}{body}");
-        scene_of(&[("scene.xml", scene.as_bytes()), ("m.ply", mesh.as_bytes())], &load::Options::default())
+        scene_of(&[("scene.xml", scene.as_bytes()), ("m.ply", mesh.as_bytes())], &mitsuba::Options::default())
     };
     for body in [
         body.to_owned(),
@@ -626,13 +627,13 @@ fn corners_that_are_not_finite_are_told() {
         "<shape type=\"obj\"><string name=\"filename\" value=\"m.obj\"/></shape><emitter type=\"constant\"/>",
     );
     let files = [("scene.xml", scene.as_bytes()), ("m.obj", mesh.as_bytes())];
-    let loaded = scene_of(&files, &load::Options::default()).unwrap();
+    let loaded = scene_of(&files, &mitsuba::Options::default()).unwrap();
     let warning = loaded.warnings().join("\n");
     assert!(
         warning.contains("m.obj: 2 of 3 triangles have a corner that is not finite, the first is number 1"),
         "{warning}"
     );
-    assert!(scene_of(&files, &load::Options { strict: true, ..load::Options::default() }).is_err());
+    assert!(scene_of(&files, &mitsuba::Options { strict: true, ..mitsuba::Options::default() }).is_err());
 }
 
 #[test]

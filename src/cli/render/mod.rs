@@ -9,12 +9,14 @@ use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 use anyhow::{Result, bail};
+use clap::ArgGroup;
 use fluxion::adaptive::Start;
 use fluxion::error::Error;
 use fluxion::ffi::memory::say_what_is_kept;
+use fluxion::mitsuba;
 use fluxion::pipeline::{Host, Prepared, RENDERING, Recipe, Rendered, Stats};
 use fluxion::render::{self, FilmSink, SampleId};
-use fluxion::scene::{Scene, load};
+use fluxion::scene::Scene;
 
 pub use self::sampling::allocator_names;
 use super::host::hosted;
@@ -25,6 +27,7 @@ use crate::cli::terminal::{note, out};
 
 /// Options of `render`.
 #[derive(clap::Args)]
+#[command(group = ArgGroup::new("recorded").multiple(true))]
 pub struct Args {
     /// Scene file, Mitsuba 3 XML
     scene: PathBuf,
@@ -55,7 +58,7 @@ impl Args {
         let texture_memory = self.texture_memory << 20;
         let light_groups = self.outputs.light_groups.clone();
         Recipe {
-            scene: load::Options { texture_memory, light_groups, ..self.options.options() },
+            scene: mitsuba::Options { texture_memory, light_groups, ..self.options.options() },
             method: self.method.recipe(),
             kernel: differences.kernel.clone(),
             pilot: differences.pilot,

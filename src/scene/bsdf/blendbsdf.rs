@@ -6,8 +6,7 @@ use super::{Bsdf, BsdfSample, Delta, Eval, Lobe};
 use crate::error::Result;
 use crate::math::{Rgb, Vec2, Vec3};
 use crate::scene::Surface;
-use crate::scene::load::props::Object;
-use crate::scene::load::{Loader, Plugin};
+use crate::scene::plugin::{Loader, Object, Plugin};
 use crate::scene::texture::{Constant, Texture};
 
 /// `blendbsdf`: `weight` is the share of the second material.
@@ -18,7 +17,7 @@ pub const MIXTURE: Plugin<Arc<dyn Bsdf>> =
     Plugin { name: "mixturebsdf", parameters: "weights, as many nested bsdfs", make: make_mixture };
 
 /// Blends of blends: the first material with the rest, the second with the rest of that, and so on.
-fn make_mixture(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Bsdf>> {
+fn make_mixture(object: &Object, loader: &mut dyn Loader) -> Result<Arc<dyn Bsdf>> {
     let loc = object.loc_of("weights");
     let text = object.string("weights", "")?;
     let words = text.split([',', ';', ' ']).filter(|word| !word.is_empty());
@@ -36,7 +35,7 @@ fn make_mixture(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Bsdf>> {
         return Err(loc.invalid(what));
     }
     if sum > 1.0 + 1e-4 {
-        loader.warn(&loc, format!("`weights` add up to {sum}: they are divided by that"))?;
+        loader.warn(&loc, &format!("`weights` add up to {sum}: they are divided by that"))?;
     }
     let (mut rest, mut rest_weight) = (super::diffuse::uniform(0.0), (1.0 - sum).max(0.0));
     for (bsdf, weight) in nested.into_iter().zip(weights).rev() {
@@ -54,7 +53,7 @@ fn make_mixture(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Bsdf>> {
     Ok(rest)
 }
 
-fn make(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Bsdf>> {
+fn make(object: &Object, loader: &mut dyn Loader) -> Result<Arc<dyn Bsdf>> {
     if object.get("weight").is_none() {
         return Err(object.loc.invalid("`blendbsdf` needs a `weight`"));
     }

@@ -7,8 +7,7 @@ use super::perturbed::{NormalMap, Perturbed};
 use crate::error::Result;
 use crate::math::Vec3;
 use crate::scene::Surface;
-use crate::scene::load::props::Object;
-use crate::scene::load::{Loader, Plugin};
+use crate::scene::plugin::{Loader, Object, Plugin};
 use crate::scene::texture::Texture;
 
 /// `bumpmap`.
@@ -19,7 +18,7 @@ pub const PLUGIN: Plugin<Arc<dyn Bsdf>> = Plugin {
     make,
 };
 
-fn make(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Bsdf>> {
+fn make(object: &Object, loader: &mut dyn Loader) -> Result<Arc<dyn Bsdf>> {
     let bumps = Bumps { height: loader.nested_texture(object)?, scale: object.float("scale", 1.0)? };
     Ok(Arc::new(Perturbed::load(object, loader, bumps)?))
 }

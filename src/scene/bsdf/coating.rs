@@ -3,13 +3,13 @@
 
 use std::sync::Arc;
 
+use super::ior::{BK7, relative_ior};
 use super::microfacet::{Kind, Microfacet, RoughTransmittance};
-use super::{BK7, Bsdf, BsdfSample, Delta, Eval, Lobe, mirror, relative_ior};
+use super::{Bsdf, BsdfSample, Delta, Eval, Lobe, mirror};
 use crate::error::Result;
 use crate::math::{Rgb, Vec2, Vec3, fresnel, vec3};
 use crate::scene::Surface;
-use crate::scene::load::props::Object;
-use crate::scene::load::{Loader, Plugin};
+use crate::scene::plugin::{Loader, Object, Plugin};
 use crate::scene::texture::Texture;
 
 /// `coating`.
@@ -27,11 +27,11 @@ pub const ROUGH: Plugin<Arc<dyn Bsdf>> = Plugin {
     make: make_rough,
 };
 
-fn make_smooth(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Bsdf>> {
+fn make_smooth(object: &Object, loader: &mut dyn Loader) -> Result<Arc<dyn Bsdf>> {
     Ok(Arc::new(Coating::load(object, loader, None)?))
 }
 
-fn make_rough(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Bsdf>> {
+fn make_rough(object: &Object, loader: &mut dyn Loader) -> Result<Arc<dyn Bsdf>> {
     object.ignore(&["sample_visible"]);
     let eta = relative_ior(object, BK7)?;
     if eta <= 1.0 {
@@ -56,7 +56,11 @@ struct Coating {
 }
 
 impl Coating {
-    fn load(object: &Object, loader: &mut Loader, facets: Option<(Microfacet, RoughTransmittance)>) -> Result<Self> {
+    fn load(
+        object: &Object,
+        loader: &mut dyn Loader,
+        facets: Option<(Microfacet, RoughTransmittance)>,
+    ) -> Result<Self> {
         let (thickness, sigma_a) = (object.float("thickness", 1.0)?, loader.texture(object, "sigma_a", Rgb::ZERO)?);
         let through = (-2.0 * thickness * sigma_a.mean()).exp();
         Ok(Self {

@@ -2,21 +2,21 @@
 
 use std::sync::Arc;
 
-use super::{Bsdf, Whole, ior, metals};
+use super::ior::ior;
+use super::{Bsdf, Whole, metals};
 use crate::error::Result;
 use crate::math::lanes::Lanes3;
 use crate::math::{Rgb, fresnel};
 use crate::scene::Surface;
 use crate::scene::closure::{self, Closure};
-use crate::scene::load::props::Object;
-use crate::scene::load::{Loader, Plugin};
+use crate::scene::plugin::{Loader, Object, Plugin};
 use crate::scene::texture::{Point, Texture};
 
 /// `conductor`.
 pub const PLUGIN: Plugin<Arc<dyn Bsdf>> =
     Plugin { name: "conductor", parameters: "material = none, eta, k, ext_eta = 1, specular_reflectance = 1", make };
 
-fn make(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Bsdf>> {
+fn make(object: &Object, loader: &mut dyn Loader) -> Result<Arc<dyn Bsdf>> {
     Ok(Arc::new(Conductor { metal: Metal::load(object, loader)? }))
 }
 
@@ -29,7 +29,7 @@ pub struct Metal {
 
 impl Metal {
     /// From `material`, or from `eta` and `k`.
-    pub fn load(object: &Object, loader: &mut Loader) -> Result<Self> {
+    pub fn load(object: &Object, loader: &mut dyn Loader) -> Result<Self> {
         let names = metals::names();
         let (eta, k) = metals::index_of_refraction(object.choice("material", &names, metals::NONE)?);
         let (eta, k) = (object.index("eta", eta)?, object.index("k", k)?);

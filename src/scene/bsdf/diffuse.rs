@@ -8,14 +8,13 @@ use crate::math::Rgb;
 use crate::math::lanes::Lanes3;
 use crate::scene::Surface;
 use crate::scene::closure::{self, Closure};
-use crate::scene::load::props::Object;
-use crate::scene::load::{Loader, Plugin};
+use crate::scene::plugin::{Loader, Object, Plugin};
 use crate::scene::texture::{Constant, Point, Texture};
 
 /// `diffuse`.
 pub const PLUGIN: Plugin<Arc<dyn Bsdf>> = Plugin { name: "diffuse", parameters: "reflectance = 0.5", make };
 
-fn make(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Bsdf>> {
+fn make(object: &Object, loader: &mut dyn Loader) -> Result<Arc<dyn Bsdf>> {
     Ok(Arc::new(Diffuse { reflectance: loader.texture(object, "reflectance", Rgb::splat(0.5))? }))
 }
 

@@ -7,14 +7,13 @@ use crate::error::Result;
 use crate::math::{Rgb, Vec2, Vec3};
 use crate::scene::Surface;
 use crate::scene::closure::Closure;
-use crate::scene::load::props::Object;
-use crate::scene::load::{Loader, Plugin};
+use crate::scene::plugin::{Loader, Object, Plugin};
 use crate::scene::texture::{Point, Texture};
 
 /// `mask`. Shadow rays do not pass it: emitters behind it are hit by the paths that do.
 pub const PLUGIN: Plugin<Arc<dyn Bsdf>> = Plugin { name: "mask", parameters: "opacity = 0.5, one nested bsdf", make };
 
-fn make(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Bsdf>> {
+fn make(object: &Object, loader: &mut dyn Loader) -> Result<Arc<dyn Bsdf>> {
     let opacity = loader.texture(object, "opacity", Rgb::splat(0.5))?;
     Ok(Arc::new(Masked { opacity, nested: loader.nested_bsdf(object)? }))
 }

@@ -9,8 +9,7 @@ use crate::math::quadrature::gauss_legendre;
 use crate::math::{Rgb, Vec2, Vec3, vec2, vec3};
 use crate::scene::closure::facets::{Facets, Ggx, Transmittance};
 use crate::scene::closure::visible_facets;
-use crate::scene::load::Loader;
-use crate::scene::load::props::Object;
+use crate::scene::plugin::{Loader, Object};
 use crate::scene::texture::{Point, Texture};
 
 /// Smaller roughness than this is indistinguishable from smooth and numerically unsafe.
@@ -45,7 +44,7 @@ pub struct Roughness {
 
 impl Roughness {
     /// From `distribution` and `alpha`, or `alpha_u` and `alpha_v`. Visible normals are always sampled.
-    pub fn load(object: &Object, loader: &mut Loader) -> Result<Self> {
+    pub fn load(object: &Object, loader: &mut dyn Loader) -> Result<Self> {
         object.ignore(&["sample_visible"]);
         let kind = Kind::load(object, loader)?;
         let mut alpha = |name: &str| loader.texture(object, name, Rgb::splat(0.1));
@@ -78,7 +77,7 @@ impl Roughness {
 
 impl Kind {
     /// From `distribution`. The powers of cosines that older files may ask for are nearly Beckmann's distribution.
-    pub fn load(object: &Object, loader: &Loader) -> Result<Self> {
+    pub fn load(object: &Object, loader: &dyn Loader) -> Result<Self> {
         let kind = object.choice("distribution", &["beckmann", "ggx", "phong", "as"], 0)?;
         if kind >= 2 {
             let what = "the distribution of facets is taken as `beckmann` of the same roughness";

@@ -7,8 +7,7 @@ use super::perturbed::{NormalMap, Perturbed};
 use crate::error::Result;
 use crate::math::{Rgb, Vec3, vec3};
 use crate::scene::Surface;
-use crate::scene::load::props::Object;
-use crate::scene::load::{Loader, Plugin};
+use crate::scene::plugin::{Loader, Object, Plugin};
 use crate::scene::texture::Texture;
 
 /// `normalmap`: red, green and blue in [0, 1] are the normal's x, y and z in [-1, 1]. Image files want `raw`.
@@ -18,7 +17,7 @@ pub const PLUGIN: Plugin<Arc<dyn Bsdf>> = Plugin {
     make,
 };
 
-fn make(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Bsdf>> {
+fn make(object: &Object, loader: &mut dyn Loader) -> Result<Arc<dyn Bsdf>> {
     // In older files the texture has no name.
     let normals = match object.get("normalmap") {
         Some(_) => loader.texture(object, "normalmap", vec3(0.5, 0.5, 1.0))?,

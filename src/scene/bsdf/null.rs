@@ -6,13 +6,12 @@ use super::{Bsdf, BsdfSample, Delta, Eval, Lobe};
 use crate::error::Result;
 use crate::math::{Rgb, Vec2, Vec3};
 use crate::scene::Surface;
-use crate::scene::load::props::Object;
-use crate::scene::load::{Loader, Plugin};
+use crate::scene::plugin::{Loader, Object, Plugin};
 
 /// `null`. Shadow rays do not see through it, as for `mask`.
 pub const PLUGIN: Plugin<Arc<dyn Bsdf>> = Plugin { name: "null", parameters: "none", make };
 
-fn make(_object: &Object, _loader: &mut Loader) -> Result<Arc<dyn Bsdf>> {
+fn make(_object: &Object, _loader: &mut dyn Loader) -> Result<Arc<dyn Bsdf>> {
     Ok(Arc::new(Null))
 }
 

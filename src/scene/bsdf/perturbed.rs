@@ -7,8 +7,7 @@ use crate::error::Result;
 use crate::math::{Rgb, Vec2, Vec3};
 use crate::scene::Surface;
 use crate::scene::closure::{Closure, Perturbation};
-use crate::scene::load::Loader;
-use crate::scene::load::props::Object;
+use crate::scene::plugin::{Loader, Object};
 use crate::scene::texture::{Point, Texture};
 
 /// Source of the perturbed normal.
@@ -32,7 +31,7 @@ pub struct Perturbed<B> {
 
 impl<B: NormalMap> Perturbed<B> {
     /// Reads the parameters that all perturbed materials share.
-    pub fn load(object: &Object, loader: &mut Loader, map: B) -> Result<Self> {
+    pub fn load(object: &Object, loader: &mut dyn Loader, map: B) -> Result<Self> {
         Ok(Self {
             map,
             flip_invalid: object.boolean("flip_invalid_normals", true)?,

@@ -7,15 +7,14 @@ use super::{Bsdf, BsdfSample, Eval, specular_share};
 use crate::error::Result;
 use crate::math::{Frame, Rgb, Vec2, Vec3, fresnel, luminance, vec3, warp};
 use crate::scene::Surface;
-use crate::scene::load::props::Object;
-use crate::scene::load::{Loader, Plugin};
+use crate::scene::plugin::{Loader, Object, Plugin};
 use crate::scene::texture::Texture;
 
 /// `phong`.
 pub const PLUGIN: Plugin<Arc<dyn Bsdf>> =
     Plugin { name: "phong", parameters: "exponent = 30, specular_reflectance = 0.2, diffuse_reflectance = 0.5", make };
 
-fn make(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Bsdf>> {
+fn make(object: &Object, loader: &mut dyn Loader) -> Result<Arc<dyn Bsdf>> {
     let exponent = loader.texture(object, "exponent", Rgb::splat(30.0))?;
     Ok(Arc::new(Phong { exponent, pair: Pair::load(object, loader)? }))
 }
@@ -31,7 +30,7 @@ pub struct Pair {
 
 impl Pair {
     /// Reads both; if together they would reflect more light than there is, both are made darker.
-    pub fn load(object: &Object, loader: &mut Loader) -> Result<Self> {
+    pub fn load(object: &Object, loader: &mut dyn Loader) -> Result<Self> {
         let diffuse = loader.texture(object, "diffuse_reflectance", Rgb::splat(0.5))?;
         let specular = loader.texture(object, "specular_reflectance", Rgb::splat(0.2))?;
         let largest = (diffuse.largest() + specular.largest()).max_element();

@@ -2,14 +2,14 @@
 
 use std::sync::Arc;
 
-use super::{Bsdf, POLYPROPYLENE, Whole, relative_ior, specular_share};
+use super::ior::{POLYPROPYLENE, relative_ior};
+use super::{Bsdf, Whole, specular_share};
 use crate::error::Result;
 use crate::math::lanes::{Lanes, Lanes3};
 use crate::math::{Rgb, fresnel};
 use crate::scene::Surface;
 use crate::scene::closure::{self, Closure};
-use crate::scene::load::props::Object;
-use crate::scene::load::{Loader, Plugin};
+use crate::scene::plugin::{Loader, Object, Plugin};
 use crate::scene::texture::{Point, Texture};
 
 /// `plastic`.
@@ -20,7 +20,7 @@ pub const PLUGIN: Plugin<Arc<dyn Bsdf>> = Plugin {
     make,
 };
 
-fn make(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Bsdf>> {
+fn make(object: &Object, loader: &mut dyn Loader) -> Result<Arc<dyn Bsdf>> {
     let eta = relative_ior(object, POLYPROPYLENE)?;
     let base = Base::load(object, loader, eta, fresnel::dielectric_diffuse(1.0 / eta))?;
     Ok(Arc::new(Plastic { eta, base }))
@@ -40,7 +40,7 @@ pub struct Base {
 
 impl Base {
     /// Reads the two reflectances and `nonlinear`: whether the base's colour is saturated by each return.
-    pub fn load(object: &Object, loader: &mut Loader, eta: f32, internal: f32) -> Result<Self> {
+    pub fn load(object: &Object, loader: &mut dyn Loader, eta: f32, internal: f32) -> Result<Self> {
         let diffuse = loader.texture(object, "diffuse_reflectance", Rgb::splat(0.5))?;
         let specular = loader.texture(object, "specular_reflectance", Rgb::ONE)?;
         let nonlinear = object.boolean("nonlinear", false)?;

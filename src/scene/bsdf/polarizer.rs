@@ -6,8 +6,7 @@ use super::{Bsdf, BsdfSample, Delta, Eval, Lobe};
 use crate::error::Result;
 use crate::math::{Rgb, Vec2, Vec3};
 use crate::scene::Surface;
-use crate::scene::load::props::Object;
-use crate::scene::load::{Loader, Plugin};
+use crate::scene::plugin::{Loader, Object, Plugin};
 use crate::scene::texture::Texture;
 
 /// `polarizer`.
@@ -28,15 +27,15 @@ pub const CIRCULAR: Plugin<Arc<dyn Bsdf>> = Plugin {
 pub const RETARDER: Plugin<Arc<dyn Bsdf>> =
     Plugin { name: "retarder", parameters: "transmittance = 1; theta, delta (ignored)", make: make_retarder };
 
-fn make_polarizer(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Bsdf>> {
+fn make_polarizer(object: &Object, loader: &mut dyn Loader) -> Result<Arc<dyn Bsdf>> {
     make(object, loader, 0.5)
 }
 
-fn make_retarder(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Bsdf>> {
+fn make_retarder(object: &Object, loader: &mut dyn Loader) -> Result<Arc<dyn Bsdf>> {
     make(object, loader, 1.0)
 }
 
-fn make(object: &Object, loader: &mut Loader, share: f32) -> Result<Arc<dyn Bsdf>> {
+fn make(object: &Object, loader: &mut dyn Loader, share: f32) -> Result<Arc<dyn Bsdf>> {
     object.ignore(&["theta", "polarizing", "left_handed", "delta"]);
     Ok(Arc::new(Filter { transmittance: loader.texture(object, "transmittance", Rgb::ONE)?, share }))
 }

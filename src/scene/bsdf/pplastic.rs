@@ -4,13 +4,13 @@
 use std::f32::consts::FRAC_1_PI;
 use std::sync::Arc;
 
+use super::ior::{POLYPROPYLENE, relative_ior};
 use super::microfacet::{Kind, Microfacet};
-use super::{Bsdf, BsdfSample, Eval, POLYPROPYLENE, relative_ior, specular_share};
+use super::{Bsdf, BsdfSample, Eval, specular_share};
 use crate::error::Result;
 use crate::math::{Rgb, Vec2, Vec3, fresnel, vec2, warp};
 use crate::scene::Surface;
-use crate::scene::load::props::Object;
-use crate::scene::load::{Loader, Plugin};
+use crate::scene::plugin::{Loader, Object, Plugin};
 use crate::scene::texture::Texture;
 
 /// `pplastic`.
@@ -21,7 +21,7 @@ pub const PLUGIN: Plugin<Arc<dyn Bsdf>> = Plugin {
     make,
 };
 
-fn make(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Bsdf>> {
+fn make(object: &Object, loader: &mut dyn Loader) -> Result<Arc<dyn Bsdf>> {
     object.ignore(&["sample_visible"]);
     let alpha = object.float("alpha", 0.1)?;
     let alpha = vec2(object.float("alpha_u", alpha)?, object.float("alpha_v", alpha)?);

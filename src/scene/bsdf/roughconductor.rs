@@ -9,8 +9,7 @@ use crate::error::Result;
 use crate::math::Rgb;
 use crate::scene::Surface;
 use crate::scene::closure::{self, Closure};
-use crate::scene::load::props::Object;
-use crate::scene::load::{Loader, Plugin};
+use crate::scene::plugin::{Loader, Object, Plugin};
 use crate::scene::texture::{Point, Texture};
 
 /// `roughconductor`.
@@ -21,7 +20,7 @@ pub const PLUGIN: Plugin<Arc<dyn Bsdf>> = Plugin {
     make,
 };
 
-fn make(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Bsdf>> {
+fn make(object: &Object, loader: &mut dyn Loader) -> Result<Arc<dyn Bsdf>> {
     Ok(Arc::new(RoughConductor { metal: Metal::load(object, loader)?, roughness: Roughness::load(object, loader)? }))
 }
 

@@ -2,15 +2,15 @@
 
 use std::sync::Arc;
 
+use super::ior::{BK7, relative_ior};
 use super::microfacet::Roughness;
-use super::{BK7, Bsdf, Whole, relative_ior};
+use super::{Bsdf, Whole};
 use crate::error::Result;
 use crate::math::Rgb;
 use crate::math::lanes::{Lanes, Lanes3};
 use crate::scene::Surface;
 use crate::scene::closure::{self, Closure};
-use crate::scene::load::props::Object;
-use crate::scene::load::{Loader, Plugin};
+use crate::scene::plugin::{Loader, Object, Plugin};
 use crate::scene::texture::{Point, Texture};
 
 /// `roughdielectric`.
@@ -21,7 +21,7 @@ pub const PLUGIN: Plugin<Arc<dyn Bsdf>> = Plugin {
     make,
 };
 
-fn make(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Bsdf>> {
+fn make(object: &Object, loader: &mut dyn Loader) -> Result<Arc<dyn Bsdf>> {
     let eta = relative_ior(object, BK7)?;
     if (eta - 1.0).abs() < 1e-4 {
         return Err(object.loc_of("int_ior").unsupported("a rough boundary between equal indices of refraction"));

@@ -7,15 +7,14 @@ use super::{Bsdf, BsdfSample, Eval};
 use crate::error::Result;
 use crate::math::{Rgb, Vec2, Vec3, warp};
 use crate::scene::Surface;
-use crate::scene::load::props::Object;
-use crate::scene::load::{Loader, Plugin};
+use crate::scene::plugin::{Loader, Object, Plugin};
 use crate::scene::texture::Texture;
 
 /// `roughdiffuse`.
 pub const PLUGIN: Plugin<Arc<dyn Bsdf>> =
     Plugin { name: "roughdiffuse", parameters: "reflectance = 0.5, alpha = 0.2, use_fast_approx = false", make };
 
-fn make(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Bsdf>> {
+fn make(object: &Object, loader: &mut dyn Loader) -> Result<Arc<dyn Bsdf>> {
     let named = if object.get("reflectance").is_some() { "reflectance" } else { "diffuse_reflectance" };
     object.ignore(&["diffuse_reflectance"]);
     Ok(Arc::new(RoughDiffuse {

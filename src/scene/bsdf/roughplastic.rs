@@ -2,16 +2,16 @@
 
 use std::sync::Arc;
 
+use super::ior::{POLYPROPYLENE, relative_ior};
 use super::microfacet::{Kind, Microfacet, RoughTransmittance};
 use super::plastic::Base;
-use super::{Bsdf, POLYPROPYLENE, Whole, relative_ior};
+use super::{Bsdf, Whole};
 use crate::error::Result;
 use crate::math::Rgb;
 use crate::math::lanes::{Lanes, Lanes3};
 use crate::scene::Surface;
 use crate::scene::closure::{self, Closure};
-use crate::scene::load::props::Object;
-use crate::scene::load::{Loader, Plugin};
+use crate::scene::plugin::{Loader, Object, Plugin};
 use crate::scene::texture::{Point, Texture};
 
 /// `roughplastic`.
@@ -22,7 +22,7 @@ pub const PLUGIN: Plugin<Arc<dyn Bsdf>> = Plugin {
     make,
 };
 
-fn make(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Bsdf>> {
+fn make(object: &Object, loader: &mut dyn Loader) -> Result<Arc<dyn Bsdf>> {
     // Visible normals are always sampled.
     object.ignore(&["sample_visible"]);
     let eta = relative_ior(object, POLYPROPYLENE)?;

@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use super::{BK7, Bsdf, BsdfSample, Delta, Eval, Lobe, relative_ior};
+use super::ior::{BK7, relative_ior};
+use super::{Bsdf, BsdfSample, Delta, Eval, Lobe};
 use crate::error::Result;
 use crate::math::{Rgb, Vec2, Vec3, fresnel};
 use crate::scene::Surface;
-use crate::scene::load::props::Object;
-use crate::scene::load::{Loader, Plugin};
+use crate::scene::plugin::{Loader, Object, Plugin};
 use crate::scene::texture::Texture;
 
 /// `thindielectric`.
@@ -17,7 +17,7 @@ pub const PLUGIN: Plugin<Arc<dyn Bsdf>> = Plugin {
     make,
 };
 
-fn make(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Bsdf>> {
+fn make(object: &Object, loader: &mut dyn Loader) -> Result<Arc<dyn Bsdf>> {
     Ok(Arc::new(ThinDielectric {
         eta: relative_ior(object, BK7)?,
         reflectance: loader.texture(object, "specular_reflectance", Rgb::ONE)?,

@@ -7,15 +7,14 @@ use crate::error::Result;
 use crate::math::{Rgb, Vec2, Vec3};
 use crate::scene::Surface;
 use crate::scene::closure::Closure;
-use crate::scene::load::props::Object;
-use crate::scene::load::{Loader, Plugin};
+use crate::scene::plugin::{Loader, Object, Plugin};
 use crate::scene::texture::{Point, Texture};
 
 /// `twosided`.
 pub const PLUGIN: Plugin<Arc<dyn Bsdf>> =
     Plugin { name: "twosided", parameters: "one or two nested bsdfs without transmission", make };
 
-fn make(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Bsdf>> {
+fn make(object: &Object, loader: &mut dyn Loader) -> Result<Arc<dyn Bsdf>> {
     let nested = loader.nested_bsdfs(object)?;
     if nested.iter().any(|bsdf| bsdf.transmits()) {
         return Err(object.loc.invalid("`twosided` around a bsdf that transmits light; nest it the other way round"));

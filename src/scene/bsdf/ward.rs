@@ -9,8 +9,7 @@ use super::{Bsdf, BsdfSample, Eval};
 use crate::error::Result;
 use crate::math::{Rgb, Vec2, Vec3, vec3, warp};
 use crate::scene::Surface;
-use crate::scene::load::props::Object;
-use crate::scene::load::{Loader, Plugin};
+use crate::scene::plugin::{Loader, Object, Plugin};
 use crate::scene::texture::Texture;
 
 /// `ward`.
@@ -21,7 +20,7 @@ pub const PLUGIN: Plugin<Arc<dyn Bsdf>> = Plugin {
     make,
 };
 
-fn make(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Bsdf>> {
+fn make(object: &Object, loader: &mut dyn Loader) -> Result<Arc<dyn Bsdf>> {
     const VARIANTS: [Variant; 3] = [Variant::Balanced, Variant::Ward, Variant::Duer];
     let variant = VARIANTS[object.choice("variant", &["balanced", "ward", "ward-duer"], 0)?];
     let both = object.float("alpha", 0.1)?;

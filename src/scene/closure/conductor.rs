@@ -1,10 +1,10 @@
 //! Metal, on the outside only: smooth, or a microfacet surface of perfect mirrors.
 
 use super::facets::Facets;
+use super::sample::Lobe;
 use super::{Deltas, Evals, Lobes, Numbers, Proposals, Scatters, parameters};
 use crate::math::fresnel::lanes as fresnel;
 use crate::math::lanes::{Lanes, Lanes3};
-use crate::scene::bsdf::Lobe;
 
 parameters! {
     /// Smooth metal.

@@ -1,10 +1,10 @@
 //! Boundaries between two transparent media: smooth, or microfacet surfaces (Walter et al. 2007).
 
 use super::facets::Facets;
+use super::sample::Lobe;
 use super::{Deltas, Evals, Lobes, Numbers, Proposals, Scatters, parameters};
 use crate::math::fresnel::lanes as fresnel;
 use crate::math::lanes::{Lanes, Lanes3};
-use crate::scene::bsdf::Lobe;
 
 parameters! {
     /// A smooth boundary.

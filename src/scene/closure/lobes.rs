@@ -1,11 +1,11 @@
 //! Lobes of closures, kind by kind.
 
 use super::facets::Facets;
+use super::sample::Lobe;
 use super::{Closure, Closures, Conductor, Deltas, Dielectric, Diffuse, Draws, Evals, Kind, Plastic, Principled};
 use super::{Numbers, PrincipledThin, Proposals, RoughConductor, RoughDielectric, RoughPlastic, Scatters};
 use crate::math::lanes::{LANES, Lanes, Lanes3, Mask};
 use crate::math::warp;
-use crate::scene::bsdf::Lobe;
 
 /// Lobes of one kind with their parameters.
 pub trait Lobes<const N: usize> {

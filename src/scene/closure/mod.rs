@@ -13,6 +13,7 @@ mod parameter;
 mod perturbation;
 mod plastic;
 mod principled;
+mod sample;
 mod scatter;
 mod terms;
 mod thin;
@@ -26,9 +27,9 @@ use self::parameter::parameters;
 pub use self::perturbation::Perturbation;
 pub use self::plastic::{Plastic, RoughPlastic};
 pub use self::principled::Principled;
+pub use self::sample::{BsdfSample, Delta, Eval, Lobe};
 pub use self::scatter::{Deltas, Draws, Evals, Numbers, Proposals, Scatters};
 pub use self::thin::PrincipledThin;
-use super::bsdf::{BsdfSample, Delta, Eval, Lobe};
 use crate::math::lanes::{Bits, LANES, Lanes, Lanes3, Mask};
 use crate::math::{Rgb, Vec2, Vec3, warp};
 

@@ -3,11 +3,11 @@
 use std::f32::consts::FRAC_1_PI;
 
 use super::facets::{Facets, Transmittance};
+use super::sample::Lobe;
 use super::{Deltas, Evals, Lobes, Numbers, Proposals, Scatters, parameters};
 use crate::math::fresnel::lanes as fresnel;
 use crate::math::lanes::{Lanes, Lanes3, Mask};
 use crate::math::warp;
-use crate::scene::bsdf::Lobe;
 
 parameters! {
     /// Smooth plastic.

@@ -1,7 +1,7 @@
 //! Results of closures: values and densities, sampled directions, delta lobes.
 
+use super::sample::{BsdfSample, Delta, Eval, Lobe};
 use crate::math::lanes::{Bits, LANES, Lanes, Lanes3, Mask};
-use crate::scene::bsdf::{BsdfSample, Delta, Eval, Lobe};
 
 /// Smooth lobes evaluated for pairs of directions, as in [`Eval`].
 #[derive(Clone, Copy, Debug)]

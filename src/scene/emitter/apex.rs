@@ -4,8 +4,7 @@ use super::{Extent, LightPoint, Position};
 use crate::error::Result;
 use crate::math::{Mat4, Vec3};
 use crate::scene::Bounds;
-use crate::scene::load::Loader;
-use crate::scene::load::props::Object;
+use crate::scene::plugin::{Loader, Object};
 
 /// The origin of `to_world`, from which light goes along its +z.
 pub struct Apex {
@@ -15,7 +14,7 @@ pub struct Apex {
 
 impl Apex {
     /// From the property `to_world`.
-    pub fn load(object: &Object, loader: &Loader) -> Result<Self> {
+    pub fn load(object: &Object, loader: &dyn Loader) -> Result<Self> {
         let to_world = loader.to_world(object)?;
         Ok(Self { position: to_world.transform_point3(Vec3::ZERO), to_local: to_world.inverse() })
     }

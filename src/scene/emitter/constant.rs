@@ -6,13 +6,12 @@ use super::{Emitter, LightPoint};
 use crate::error::Result;
 use crate::math::{Rgb, Vec2, Vec3, warp};
 use crate::scene::Bounds;
-use crate::scene::load::props::Object;
-use crate::scene::load::{Loader, Plugin};
+use crate::scene::plugin::{Loader, Object, Plugin};
 
 /// `constant`.
 pub const PLUGIN: Plugin<Box<dyn Emitter>> = Plugin { name: "constant", parameters: "radiance = 1", make };
 
-fn make(object: &Object, loader: &mut Loader) -> Result<Box<dyn Emitter>> {
+fn make(object: &Object, loader: &mut dyn Loader) -> Result<Box<dyn Emitter>> {
     Ok(Box::new(Constant { radiance: loader.uniform_radiance(object, "radiance")?, area: 1.0 }))
 }
 

@@ -4,14 +4,13 @@ use super::{Emitter, LightPoint, Position};
 use crate::error::Result;
 use crate::math::{Rgb, Vec2, Vec3};
 use crate::scene::Bounds;
-use crate::scene::load::props::Object;
-use crate::scene::load::{Loader, Plugin};
+use crate::scene::plugin::{Loader, Object, Plugin};
 
 /// `directional`: shines along `direction`, or along +z of `to_world`.
 pub const PLUGIN: Plugin<Box<dyn Emitter>> =
     Plugin { name: "directional", parameters: "direction = +z or to_world, irradiance = 1", make };
 
-fn make(object: &Object, loader: &mut Loader) -> Result<Box<dyn Emitter>> {
+fn make(object: &Object, loader: &mut dyn Loader) -> Result<Box<dyn Emitter>> {
     if object.get("direction").is_some() && object.get("to_world").is_some() {
         return Err(object.loc_of("direction").invalid("give either `direction` or `to_world`"));
     }

@@ -9,15 +9,14 @@ use crate::math::lanes::{Lanes, Lanes3, Mask};
 use crate::math::partition::Partition;
 use crate::math::{Mat4, Rgb, Vec2, Vec3, Vec4, luminance, vec2, vec3};
 use crate::scene::Bounds;
-use crate::scene::load::props::Object;
-use crate::scene::load::{Loader, Plugin};
+use crate::scene::plugin::{Loader, Object, Plugin};
 use crate::scene::texture::{self, Selection, Texels, bitmap};
 
 /// `envmap`.
 pub const PLUGIN: Plugin<Box<dyn Emitter>> =
     Plugin { name: "envmap", parameters: "filename, scale = 1, to_world, gamma, mis_compensation (ignored)", make };
 
-fn make(object: &Object, loader: &mut Loader) -> Result<Box<dyn Emitter>> {
+fn make(object: &Object, loader: &mut dyn Loader) -> Result<Box<dyn Emitter>> {
     let scale = object.float("scale", 1.0)?;
     let to_world = object.transform("to_world")?;
     object.ignore(&["mis_compensation"]);

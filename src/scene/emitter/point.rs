@@ -6,14 +6,13 @@ use super::{Emitter, Extent, LightPoint, Position};
 use crate::error::Result;
 use crate::math::{Rgb, Vec2, Vec3};
 use crate::scene::Bounds;
-use crate::scene::load::props::Object;
-use crate::scene::load::{Loader, Plugin};
+use crate::scene::plugin::{Loader, Object, Plugin};
 
 /// `point`.
 pub const PLUGIN: Plugin<Box<dyn Emitter>> =
     Plugin { name: "point", parameters: "position = 0 or to_world, intensity = 1", make };
 
-fn make(object: &Object, loader: &mut Loader) -> Result<Box<dyn Emitter>> {
+fn make(object: &Object, loader: &mut dyn Loader) -> Result<Box<dyn Emitter>> {
     if object.get("position").is_some() && object.get("to_world").is_some() {
         return Err(object.loc_of("position").invalid("give either `position` or `to_world`"));
     }

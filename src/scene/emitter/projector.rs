@@ -7,8 +7,7 @@ use super::apex::Apex;
 use super::{Emitter, Extent, LightPoint};
 use crate::error::Result;
 use crate::math::{Rgb, Vec2, Vec3, vec2};
-use crate::scene::load::props::Object;
-use crate::scene::load::{Loader, Plugin};
+use crate::scene::plugin::{Loader, Object, Plugin};
 use crate::scene::sensor;
 use crate::scene::texture::{self, Texture};
 
@@ -20,7 +19,7 @@ pub const PLUGIN: Plugin<Box<dyn Emitter>> = Plugin {
     make,
 };
 
-fn make(object: &Object, loader: &mut Loader) -> Result<Box<dyn Emitter>> {
+fn make(object: &Object, loader: &mut dyn Loader) -> Result<Box<dyn Emitter>> {
     let slide = loader.radiance(object, "irradiance")?;
     let aspect = slide.resolution().map_or(1.0, |size| size.x / size.y);
     let half_width = sensor::half_width(object, aspect)?;

@@ -7,8 +7,7 @@ use super::apex::Apex;
 use super::{Emitter, Extent, LightPoint};
 use crate::error::Result;
 use crate::math::{Rgb, Vec2, Vec3, vec2};
-use crate::scene::load::props::Object;
-use crate::scene::load::{Loader, Plugin};
+use crate::scene::plugin::{Loader, Object, Plugin};
 use crate::scene::texture::{self, Texture};
 
 /// `spot`: shines along +z of `to_world`. Angles are in degrees, from the axis.
@@ -18,7 +17,7 @@ pub const PLUGIN: Plugin<Box<dyn Emitter>> = Plugin {
     make,
 };
 
-fn make(object: &Object, loader: &mut Loader) -> Result<Box<dyn Emitter>> {
+fn make(object: &Object, loader: &mut dyn Loader) -> Result<Box<dyn Emitter>> {
     let cutoff = object.float("cutoff_angle", 20.0)?;
     let beam = object.float("beam_width", 0.75 * cutoff)?;
     if !(cutoff > 0.0 && cutoff <= 90.0 && (0.0..=cutoff).contains(&beam)) {

@@ -27,6 +27,12 @@ pub struct ShapeInfo {
 }
 
 impl ShapeInfo {
+    /// The same without faster ways: the material is evaluated through its trait, and texture coordinates are always looked up. Renders
+    /// have the same bits, and take longer.
+    pub fn general(self) -> Self {
+        Self { closes: false, closure: None, uv: true, ..self }
+    }
+
     /// The properties of a shape.
     pub fn new(shape: &Shape) -> Self {
         let Shape { geometry, bsdf, emitter, .. } = shape;

@@ -7,8 +7,7 @@ use std::fmt;
 use crate::error::{Error, Result};
 use crate::image::io::DataWindow;
 use crate::math::{Vec2, vec2};
-use crate::scene::load::Loader;
-use crate::scene::load::props::Object;
+use crate::scene::plugin::{Loader, Object};
 
 /// A rectangle of pixels of the full film.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -69,7 +68,7 @@ impl FilmWindow {
     /// The film of a file, or the default one, with other numbers of pixels or another window of it.
     pub fn load(
         object: Option<&Object>,
-        loader: &Loader,
+        loader: &dyn Loader,
         size: Option<(usize, usize)>,
         crop: Option<Crop>,
     ) -> Result<Self> {
@@ -105,7 +104,7 @@ impl FilmWindow {
 
     /// Size and crop window. The output's format is the command line's to say, and pixels are means over their
     /// squares: gradients between pixels are only defined for the box filter.
-    fn of_object(object: &Object, loader: &Loader) -> Result<Self> {
+    fn of_object(object: &Object, loader: &dyn Loader) -> Result<Self> {
         let dimension = |name: &str, default| {
             let value = object.integer(name, default)?;
             usize::try_from(value).map_err(|_| object.loc_of(name).invalid(format!("`{name}` cannot be negative")))
@@ -123,7 +122,7 @@ impl FilmWindow {
         let format = object.string("pixel_format", "rgb")?.to_lowercase();
         if !["rgb", "rgba", "multichannel"].contains(&format.as_str()) {
             let what = format!("images are written in RGB, not as `{format}`");
-            loader.warn(&object.loc_of("pixel_format"), what)?;
+            loader.warn(&object.loc_of("pixel_format"), &what)?;
         }
         if object.float("exposure", 0.0)? != 0.0 {
             loader.warn(&object.loc_of("exposure"), "the film's `exposure` is ignored: give it with --exposure")?;

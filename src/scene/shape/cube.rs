@@ -1,11 +1,11 @@
 //! The cube [-1, 1]³; each face has the texture's whole unit square.
 
 use super::Geometry;
+use super::finite::finite;
 use super::mesh::{Mesh, Placement};
 use crate::error::Result;
 use crate::math::{Vec3, vec2, vec3};
-use crate::scene::load::props::Object;
-use crate::scene::load::{Loader, MeshData, Plugin};
+use crate::scene::plugin::{Loader, MeshData, Object, Plugin};
 
 /// `cube`.
 pub const PLUGIN: Plugin<Geometry> = Plugin { name: "cube", parameters: "to_world, flip_normals = false", make };
@@ -20,7 +20,7 @@ const FACES: [[Vec3; 3]; 6] = [
     [Vec3::NEG_Z, Vec3::NEG_Y, Vec3::NEG_X],
 ];
 
-fn make(object: &Object, loader: &mut Loader) -> Result<Geometry> {
+fn make(object: &Object, loader: &mut dyn Loader) -> Result<Geometry> {
     let to_world = loader.to_world(object)?;
     let flip_normals = object.boolean("flip_normals", false)?;
     let mut data = MeshData::default();
@@ -36,5 +36,5 @@ fn make(object: &Object, loader: &mut Loader) -> Result<Geometry> {
         data.triangles.extend(order.map(|triangle| triangle.map(|corner| base + corner)));
     }
     debug_assert!(data.positions.iter().all(|p| p.abs() == vec3(1.0, 1.0, 1.0)));
-    loader.finite(object, Geometry::Mesh(Mesh::new(data, Placement { to_world, face_normals: false, flip_normals })))
+    finite(object, Geometry::Mesh(Mesh::new(data, Placement { to_world, face_normals: false, flip_normals })))
 }

@@ -5,12 +5,12 @@ use std::f32::consts::{PI, TAU};
 use std::path::Path;
 use std::sync::Arc;
 
+use super::finite::finite;
 use super::{Bounds, Geometry};
 use crate::error::{Error, Result, SourceLoc};
 use crate::ffi::embree::{CurveData, CurveKind, Hit};
 use crate::math::{Frame, Mat4, Vec3, Vec4, vec2};
-use crate::scene::load::props::Object;
-use crate::scene::load::{Loader, Plugin, values};
+use crate::scene::plugin::{Loader, Object, Plugin, values};
 use crate::scene::{Ray, Surface, texture};
 
 /// `bsplinecurve`: uniform cubic B-splines, each of four control points or more.
@@ -18,11 +18,11 @@ pub const BSPLINE: Plugin<Geometry> = Plugin { name: "bsplinecurve", parameters:
 /// `linearcurve`: straight pieces between control points, each curve of two or more.
 pub const LINEAR: Plugin<Geometry> = Plugin { name: "linearcurve", parameters: "filename, to_world", make };
 
-fn make(object: &Object, loader: &mut Loader) -> Result<Geometry> {
+fn make(object: &Object, loader: &mut dyn Loader) -> Result<Geometry> {
     let kind = if object.plugin == "bsplinecurve" { CurveKind::FLUXION_BSPLINE } else { CurveKind::FLUXION_LINEAR };
     let (to_world, path) = (loader.to_world(object)?, loader.file(object)?);
     let text = std::fs::read_to_string(&path).map_err(|error| Error::io(&path, error))?;
-    loader.finite(object, Geometry::Curves(Curves::new(read(kind, &text, &path)?, to_world)))
+    finite(object, Geometry::Curves(Curves::new(read(kind, &text, &path)?, to_world)))
 }
 
 /// Curves from a text: a line of x, y, z and the radius for every control point, with empty lines between curves.

@@ -2,21 +2,21 @@
 
 use std::f32::consts::TAU;
 
+use super::finite::finite;
 use super::mesh::{Mesh, Placement};
 use super::{Bounds, Geometry, tessellation};
 use crate::error::Result;
 use crate::ffi::embree::{Hit, Quadric, QuadricKind};
 use crate::math::{Frame, Mat4, Vec2, Vec3, vec2, vec3};
-use crate::scene::emitter::{LightPoint, Position};
-use crate::scene::load::props::Object;
-use crate::scene::load::{Loader, Plugin};
+use crate::scene::light_point::{LightPoint, Position};
+use crate::scene::plugin::{Loader, Object, Plugin};
 use crate::scene::{Ray, Surface, texture};
 
 /// `cylinder`: from `p0` to `p1`, then `to_world`.
 pub const PLUGIN: Plugin<Geometry> =
     Plugin { name: "cylinder", parameters: "p0 = 0, p1 = +z, radius = 1, to_world, flip_normals = false", make };
 
-fn make(object: &Object, loader: &mut Loader) -> Result<Geometry> {
+fn make(object: &Object, loader: &mut dyn Loader) -> Result<Geometry> {
     let (p0, p1) = (object.vector("p0", Vec3::ZERO)?, object.vector("p1", Vec3::Z)?);
     let radius = object.float("radius", 1.0)?;
     let side = if object.boolean("flip_normals", false)? { -1.0 } else { 1.0 };
@@ -31,9 +31,9 @@ fn make(object: &Object, loader: &mut Loader) -> Result<Geometry> {
     if (x - y).abs() > 1e-3 * x || tessellation::is_sheared(to_world) {
         loader.warn(&object.loc_of("to_world"), "a cylinder scaled unevenly is traced as a mesh of triangles")?;
         let placement = Placement { to_world, face_normals: false, flip_normals: side < 0.0 };
-        return loader.finite(object, Geometry::Mesh(Mesh::new(tessellation::cylinder(), placement)));
+        return finite(object, Geometry::Mesh(Mesh::new(tessellation::cylinder(), placement)));
     }
-    loader.finite(object, Geometry::Cylinder(Cylinder { to_world, to_object: to_world.inverse(), radius: x, side }))
+    finite(object, Geometry::Cylinder(Cylinder { to_world, to_object: to_world.inverse(), radius: x, side }))
 }
 
 /// One cylinder in world space.

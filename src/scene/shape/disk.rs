@@ -2,22 +2,22 @@
 
 use std::f32::consts::{PI, TAU};
 
+use super::finite::finite;
 use super::{Bounds, Geometry};
 use crate::error::Result;
 use crate::ffi::embree::{Hit, Quadric, QuadricKind};
 use crate::math::{Frame, Mat4, Vec2, Vec3, vec2, vec3, warp};
-use crate::scene::emitter::{LightPoint, Position};
-use crate::scene::load::props::Object;
-use crate::scene::load::{Loader, Plugin};
+use crate::scene::light_point::{LightPoint, Position};
+use crate::scene::plugin::{Loader, Object, Plugin};
 use crate::scene::{Ray, Surface, texture};
 
 /// `disk`: the unit disk in the plane z = 0, facing +z; an ellipse when scaled unevenly.
 pub const PLUGIN: Plugin<Geometry> = Plugin { name: "disk", parameters: "to_world, flip_normals = false", make };
 
-fn make(object: &Object, loader: &mut Loader) -> Result<Geometry> {
+fn make(object: &Object, loader: &mut dyn Loader) -> Result<Geometry> {
     let to_world = loader.to_world(object)?;
     let side = if object.boolean("flip_normals", false)? { -1.0 } else { 1.0 };
-    loader.finite(object, Geometry::Disk(Disk { to_world, to_object: to_world.inverse(), side }))
+    finite(object, Geometry::Disk(Disk { to_world, to_object: to_world.inverse(), side }))
 }
 
 /// One disk in world space.

@@ -2,10 +2,9 @@
 
 use super::Geometry;
 use super::mesh::{Mesh, Placement};
+use super::smooth;
 use crate::error::{Result, SourceLoc};
-use crate::scene::load::mesh::smooth;
-use crate::scene::load::props::Object;
-use crate::scene::load::{Loader, Plugin};
+use crate::scene::plugin::{Loader, Object, Plugin};
 
 /// `obj`: texture coordinates count from the bottom, so they are turned over unless told otherwise.
 pub const OBJ: Plugin<Geometry> = Plugin {
@@ -29,7 +28,7 @@ pub const SERIALIZED: Plugin<Geometry> = Plugin {
     make,
 };
 
-fn make(object: &Object, loader: &mut Loader) -> Result<Geometry> {
+fn make(object: &Object, loader: &mut dyn Loader) -> Result<Geometry> {
     let to_world = loader.to_world(object)?;
     let face_normals = object.boolean("face_normals", false)?;
     let flip_normals = object.boolean("flip_normals", false)?;
@@ -43,7 +42,7 @@ fn make(object: &Object, loader: &mut Loader) -> Result<Geometry> {
     let mut data = loader.mesh(object)?;
     if data.triangles.is_empty() {
         let what = format!("the {} file has no faces that can be read: nothing is shown of it", object.plugin);
-        loader.warn(&object.loc_of("filename"), what)?;
+        loader.warn(&object.loc_of("filename"), &what)?;
     }
     let lost = |triangle: &[u32; 3]| {
         triangle.iter().any(|&i| !to_world.transform_point3(data.positions[i as usize]).is_finite())
@@ -51,7 +50,7 @@ fn make(object: &Object, loader: &mut Loader) -> Result<Geometry> {
     if let Some(first) = data.triangles.iter().position(lost) {
         let (count, all) = (data.triangles.iter().filter(|&triangle| lost(triangle)).count(), data.triangles.len());
         let what = format!("{count} of {all} triangles have a corner that is not finite, the first is number {first}");
-        loader.warn(&SourceLoc::file(&loader.file(object)?), format!("{what} (counted from 0): they are left out"))?;
+        loader.warn(&SourceLoc::file(&loader.file(object)?), &format!("{what} (counted from 0): they are left out"))?;
     }
     if let Some(degrees) = smooth_up_to {
         data = smooth::split(data, degrees);

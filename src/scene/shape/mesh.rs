@@ -6,8 +6,8 @@ use super::Bounds;
 use crate::ffi::embree::{Hit, PaddedVertices};
 use crate::math::alias::Alias;
 use crate::math::{Frame, Mat4, Rgb, Vec2, Vec3, vec2, warp};
-use crate::scene::emitter::{LightPoint, Position};
-use crate::scene::load::MeshData;
+use crate::scene::light_point::{LightPoint, Position};
+use crate::scene::plugin::MeshData;
 use crate::scene::{Ray, Surface, texture};
 
 /// Triangles with optional normals and texture coordinates, shared with Embree.

@@ -5,8 +5,11 @@ pub mod curves;
 pub mod cylinder;
 pub mod disk;
 mod files;
+mod finite;
 pub mod mesh;
+mod plugins;
 mod rectangle;
+mod smooth;
 pub mod sphere;
 mod tessellation;
 
@@ -16,26 +19,12 @@ pub use self::curves::Curves;
 pub use self::cylinder::Cylinder;
 pub use self::disk::Disk;
 pub use self::mesh::Mesh;
+pub use self::plugins::PLUGINS;
 pub use self::sphere::Sphere;
-use super::emitter::LightPoint;
-use super::load::Plugin;
+use super::light_point::LightPoint;
 use super::{Ray, Surface};
 use crate::ffi::embree::{Hit, Quadric, QuadricKind};
 use crate::math::{Mat4, Vec2, Vec3};
-
-/// The shapes of scene files.
-pub const PLUGINS: &[Plugin<Geometry>] = &[
-    files::OBJ,
-    files::PLY,
-    files::SERIALIZED,
-    rectangle::PLUGIN,
-    cube::PLUGIN,
-    sphere::PLUGIN,
-    disk::PLUGIN,
-    cylinder::PLUGIN,
-    curves::BSPLINE,
-    curves::LINEAR,
-];
 
 /// An axis-aligned box.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,16 +1,16 @@
 //! The square [-1, 1]² in the plane z = 0, facing +z.
 
 use super::Geometry;
+use super::finite::finite;
 use super::mesh::{Mesh, Placement};
 use crate::error::Result;
 use crate::math::{Vec3, vec2, vec3};
-use crate::scene::load::props::Object;
-use crate::scene::load::{Loader, MeshData, Plugin};
+use crate::scene::plugin::{Loader, MeshData, Object, Plugin};
 
 /// `rectangle`.
 pub const PLUGIN: Plugin<Geometry> = Plugin { name: "rectangle", parameters: "to_world, flip_normals = false", make };
 
-fn make(object: &Object, loader: &mut Loader) -> Result<Geometry> {
+fn make(object: &Object, loader: &mut dyn Loader) -> Result<Geometry> {
     let to_world = loader.to_world(object)?;
     let flip_normals = object.boolean("flip_normals", false)?;
     let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
@@ -22,5 +22,5 @@ fn make(object: &Object, loader: &mut Loader) -> Result<Geometry> {
         triangles: vec![[0, 1, 2], [0, 2, 3]],
         ..MeshData::default()
     };
-    loader.finite(object, Geometry::Mesh(Mesh::new(data, Placement { to_world, face_normals: false, flip_normals })))
+    finite(object, Geometry::Mesh(Mesh::new(data, Placement { to_world, face_normals: false, flip_normals })))
 }

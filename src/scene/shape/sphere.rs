@@ -2,21 +2,21 @@
 
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
 
+use super::finite::finite;
 use super::mesh::{Mesh, Placement};
 use super::{Bounds, Geometry, tessellation};
 use crate::error::Result;
 use crate::ffi::embree::Hit;
 use crate::math::{Frame, Mat4, Vec2, Vec3, vec2, vec3, warp};
-use crate::scene::emitter::{LightPoint, Position};
-use crate::scene::load::props::Object;
-use crate::scene::load::{Loader, Plugin};
+use crate::scene::light_point::{LightPoint, Position};
+use crate::scene::plugin::{Loader, Object, Plugin};
 use crate::scene::{Ray, Surface, texture};
 
 /// `sphere`: centre and radius, then `to_world`.
 pub const PLUGIN: Plugin<Geometry> =
     Plugin { name: "sphere", parameters: "center = 0, radius = 1, to_world, flip_normals = false", make };
 
-fn make(object: &Object, loader: &mut Loader) -> Result<Geometry> {
+fn make(object: &Object, loader: &mut dyn Loader) -> Result<Geometry> {
     let center = object.vector("center", Vec3::ZERO)?;
     let radius = object.float("radius", 1.0)?;
     let to_world = loader.to_world(object)?;
@@ -30,10 +30,10 @@ fn make(object: &Object, loader: &mut Loader) -> Result<Geometry> {
         loader.warn(&object.loc_of("to_world"), "a sphere scaled unevenly is traced as a mesh of triangles")?;
         let placed = to_world * Mat4::from_translation(center) * Mat4::from_scale(Vec3::splat(radius));
         let placement = Placement { to_world: placed, face_normals: false, flip_normals: flip };
-        return loader.finite(object, Geometry::Mesh(Mesh::new(tessellation::sphere(), placement)));
+        return finite(object, Geometry::Mesh(Mesh::new(tessellation::sphere(), placement)));
     }
     let mirrored = to_world.determinant() < 0.0;
-    loader.finite(
+    finite(
         object,
         Geometry::Sphere(Sphere {
             center: to_world.transform_point3(center),

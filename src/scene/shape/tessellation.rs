@@ -3,7 +3,7 @@
 use std::f32::consts::{PI, TAU};
 
 use crate::math::{Mat4, Vec3, vec2, vec3};
-use crate::scene::load::MeshData;
+use crate::scene::plugin::MeshData;
 
 /// Columns around an axis, by which areas are too small by one part in ten thousand.
 const COLUMNS: u32 = 256;

@@ -6,8 +6,7 @@ use super::{Point, Selection, Texels, Texture, UvTransform};
 use crate::error::Result;
 use crate::image::channels::Integers;
 use crate::math::{Rgb, Vec2, luminance, vec2};
-use crate::scene::load::props::Object;
-use crate::scene::load::{Loader, Plugin};
+use crate::scene::plugin::{Loader, Object, Plugin};
 
 /// `bitmap`. Without `channel`, an alpha channel is not used.
 pub const PLUGIN: Plugin<Arc<dyn Texture>> = Plugin {
@@ -18,7 +17,7 @@ pub const PLUGIN: Plugin<Arc<dyn Texture>> = Plugin {
     make,
 };
 
-fn make(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Texture>> {
+fn make(object: &Object, loader: &mut dyn Loader) -> Result<Arc<dyn Texture>> {
     let nearest = object.choice("filter_type", &["bilinear", "nearest"], 0)? == 1;
     let both = Wrap::load(object, "wrap_mode", Wrap::Repeat)?;
     let wrap = [Wrap::load(object, "wrap_mode_u", both)?, Wrap::load(object, "wrap_mode_v", both)?];

@@ -5,14 +5,13 @@ use std::sync::Arc;
 use super::{Point, Texture, UvTransform};
 use crate::error::Result;
 use crate::math::{Rgb, Vec2};
-use crate::scene::load::props::Object;
-use crate::scene::load::{Loader, Plugin};
+use crate::scene::plugin::{Loader, Object, Plugin};
 
 /// `checkerboard`.
 pub const PLUGIN: Plugin<Arc<dyn Texture>> =
     Plugin { name: "checkerboard", parameters: "color0 = 0.4, color1 = 0.2, to_uv", make };
 
-fn make(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Texture>> {
+fn make(object: &Object, loader: &mut dyn Loader) -> Result<Arc<dyn Texture>> {
     Ok(Arc::new(Checkerboard {
         colors: [
             loader.texture(object, "color0", Rgb::splat(0.4))?,

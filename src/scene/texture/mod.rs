@@ -3,33 +3,17 @@
 pub mod bitmap;
 mod checkerboard;
 mod mesh_attribute;
+mod plugins;
 mod scale;
 pub mod spectra;
 mod texels;
+mod unbound;
 mod uniform;
 
-pub use self::mesh_attribute::{Unbound, bind};
+pub use self::plugins::PLUGINS;
 pub use self::texels::{Memory, Selection, Texels};
-use super::load::Plugin;
-use super::load::props::Object;
-use crate::error::Result;
-use crate::math::{Mat4, Rgb, Vec2, luminance, vec2};
-use std::sync::Arc;
-
-/// The textures of scene files.
-pub const PLUGINS: &[Plugin<Arc<dyn Texture>>] = &[
-    bitmap::PLUGIN,
-    checkerboard::PLUGIN,
-    mesh_attribute::PLUGIN,
-    scale::PLUGIN,
-    uniform::UNIFORM,
-    uniform::RAW,
-    spectra::D65,
-    spectra::SRGB,
-    spectra::BLACKBODY,
-    spectra::REGULAR,
-    spectra::IRREGULAR,
-];
+pub use self::unbound::{Unbound, bind};
+use crate::math::{Rgb, Vec2, luminance};
 
 /// A point of a shape, as textures see it.
 #[derive(Clone, Copy, Debug, Default)]
@@ -108,12 +92,6 @@ struct UvTransform {
 }
 
 impl UvTransform {
-    fn load(object: &Object) -> Result<Self> {
-        let matrix: Mat4 = object.transform("to_uv")?;
-        let column = |axis: glam::Vec4| vec2(axis.x, axis.y);
-        Ok(Self { u: column(matrix.x_axis), v: column(matrix.y_axis), origin: column(matrix.w_axis) })
-    }
-
     fn apply(&self, uv: Vec2) -> Vec2 {
         self.u * uv.x + self.v * uv.y + self.origin
     }

@@ -5,14 +5,13 @@ use std::sync::Arc;
 use super::{Point, Texture};
 use crate::error::Result;
 use crate::math::{Rgb, Vec2};
-use crate::scene::load::props::Object;
-use crate::scene::load::{Loader, Plugin};
+use crate::scene::plugin::{Loader, Object, Plugin};
 
 /// `scale`: a nested texture under any name, or the colour `value`.
 pub const PLUGIN: Plugin<Arc<dyn Texture>> =
     Plugin { name: "scale", parameters: "scale = 1, one nested texture or value", make };
 
-fn make(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Texture>> {
+fn make(object: &Object, loader: &mut dyn Loader) -> Result<Arc<dyn Texture>> {
     let scale = object.color("scale", Rgb::ONE)?;
     let nested = match object.get("value") {
         Some(_) => loader.texture(object, "value", Rgb::ONE)?,

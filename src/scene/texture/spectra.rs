@@ -5,9 +5,8 @@ use std::sync::Arc;
 use super::{Constant, Texture};
 use crate::error::Result;
 use crate::math::Rgb;
-use crate::scene::load::props::{Object, Property, Value};
-use crate::scene::load::spectrum::Spectrum;
-use crate::scene::load::{Loader, Plugin, values};
+use crate::scene::plugin::{Loader, Object, Plugin, Property, Value, values};
+use crate::scene::spectrum::Spectrum;
 
 /// `d65`: daylight, which is white in linear sRGB, in a colour.
 pub const D65: Plugin<Arc<dyn Texture>> =
@@ -27,7 +26,7 @@ pub const REGULAR: Plugin<Arc<dyn Texture>> =
 pub const IRREGULAR: Plugin<Arc<dyn Texture>> =
     Plugin { name: "irregular", parameters: "wavelengths, values", make: make_curve };
 
-fn make_d65(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Texture>> {
+fn make_d65(object: &Object, loader: &mut dyn Loader) -> Result<Arc<dyn Texture>> {
     let scale = object.float("scale", 1.0)?;
     let nested = object.nested().next().is_some();
     let named = object.get("color").is_some();
@@ -38,11 +37,11 @@ fn make_d65(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Texture>> {
     Ok(color.constant().map_or(color, |color| Arc::new(Constant(color * scale))))
 }
 
-fn make_srgb(object: &Object, _loader: &mut Loader) -> Result<Arc<dyn Texture>> {
+fn make_srgb(object: &Object, _loader: &mut dyn Loader) -> Result<Arc<dyn Texture>> {
     Ok(Arc::new(Constant(object.color("color", Rgb::ONE)?)))
 }
 
-fn make_curve(object: &Object, _loader: &mut Loader) -> Result<Arc<dyn Texture>> {
+fn make_curve(object: &Object, _loader: &mut dyn Loader) -> Result<Arc<dyn Texture>> {
     let curve = curve(object)?.map_or(Rgb::ONE, |spectrum| spectrum.reflectance());
     Ok(Arc::new(Constant(curve)))
 }

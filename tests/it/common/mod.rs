@@ -7,8 +7,9 @@ use std::process::{Child, Command};
 use std::time::Duration;
 
 use fluxion::film::{Film, Needs};
+use fluxion::mitsuba;
 use fluxion::render::{Budget, Control, RenderSettings, Shift, render};
-use fluxion::scene::{Scene, load};
+use fluxion::scene::Scene;
 
 /// The repository's top folder.
 pub fn root() -> PathBuf {
@@ -25,13 +26,13 @@ pub fn try_scene(body: &str) -> fluxion::error::Result<Scene> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scene.xml");
     std::fs::write(&path, format!("<scene version=\"3.0.0\">\n{body}\n</scene>")).unwrap();
-    load::load(&path, &load::Options::default())
+    mitsuba::load(&path, &mitsuba::Options::default())
 }
 
 /// A bundled scene at a size of our choice.
 pub fn bundled(name: &str, size: (usize, usize)) -> Scene {
-    let options = load::Options { size: Some(size), ..load::Options::default() };
-    load::load(&root().join("scenes").join(name).join("scene.xml"), &options).unwrap()
+    let options = mitsuba::Options { size: Some(size), ..mitsuba::Options::default() };
+    mitsuba::load(&root().join("scenes").join(name).join("scene.xml"), &options).unwrap()
 }
 
 /// A camera at `origin` that looks at the coordinate origin.

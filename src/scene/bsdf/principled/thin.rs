@@ -9,8 +9,7 @@ use crate::math::lanes::{Lanes, Lanes3};
 use crate::scene::Surface;
 use crate::scene::bsdf::{Bsdf, Whole};
 use crate::scene::closure::{self, Closure};
-use crate::scene::load::props::Object;
-use crate::scene::load::{Loader, Plugin};
+use crate::scene::plugin::{Loader, Object, Plugin};
 use crate::scene::texture::{Point, Texture};
 
 /// `principledthin`.
@@ -22,7 +21,7 @@ pub const PLUGIN: Plugin<Arc<dyn Bsdf>> = Plugin {
     make,
 };
 
-fn make(object: &Object, loader: &mut Loader) -> Result<Arc<dyn Bsdf>> {
+fn make(object: &Object, loader: &mut dyn Loader) -> Result<Arc<dyn Bsdf>> {
     object.ignore(&[
         "specular_reflectance_sampling_rate",
         "specular_transmittance_sampling_rate",

@@ -14,8 +14,7 @@ use crate::error::Result;
 use crate::math::partition::Partition;
 use crate::math::{Frame, Mat4, Rgb, Vec2, Vec3, luminance, vec2, vec3, warp};
 use crate::scene::Bounds;
-use crate::scene::load::props::Object;
-use crate::scene::load::{Loader, Plugin};
+use crate::scene::plugin::{Loader, Object, Plugin};
 
 const PARAMETERS: &str = "turbidity = 3, albedo = 0.3 (0.2 in files of version 0.6), sun_direction or latitude, \
     longitude, timezone, year, month, day, hour, minute, second; sun_scale = 1, sky_scale = 1, \
@@ -31,7 +30,7 @@ pub const SUN: Plugin<Box<dyn Emitter>> = Plugin { name: "sun", parameters: "as 
 /// Luminous efficacies of both renderers that radiances of the sky are divided by.
 const SKY_UNITS: [f32; 2] = [106.750_26, 106.856_98];
 
-fn make(object: &Object, loader: &mut Loader) -> Result<Box<dyn Emitter>> {
+fn make(object: &Object, loader: &mut dyn Loader) -> Result<Box<dyn Emitter>> {
     let is_old = object.string("convention", "3")? == "0.6";
     let to_world = object.transform("to_world")?;
     let turbidity = object.float("turbidity", 3.0)?;

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use crate::error::Result;
-use crate::scene::load::props::Object;
+use crate::scene::plugin::Object;
 
 /// Properties that say when and where; Tokyo on a summer afternoon unless they are given.
 pub const PROPERTIES: [&str; 9] =

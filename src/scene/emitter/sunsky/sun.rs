@@ -1,7 +1,7 @@
 //! Radiance of the sun's disk through the atmosphere, in linear sRGB.
 
 use crate::math::Rgb;
-use crate::scene::load::spectrum::Spectrum;
+use crate::scene::spectrum::Spectrum;
 
 /// Half the angle under which the sun is seen.
 pub const HALF_ANGLE: f32 = 0.267_9 * std::f32::consts::PI / 180.0;

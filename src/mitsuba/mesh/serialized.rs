@@ -8,9 +8,9 @@ use std::path::Path;
 
 use flate2::read::ZlibDecoder;
 
-use super::MeshData;
 use crate::error::{Result, SourceLoc};
 use crate::math::{Vec2, Vec3};
+use crate::scene::plugin::MeshData;
 
 const IDENTIFIER: u16 = 0x041c;
 const HAS_NORMALS: u32 = 0x0001;

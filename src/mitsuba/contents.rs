@@ -4,11 +4,12 @@ use std::collections::HashMap;
 use std::rc::Rc;
 use std::sync::Arc;
 
-use super::props::Object;
-use super::{Loader, find};
+use super::loader::FileLoader;
 use crate::error::Result;
 use crate::math::{Vec2, Vec3};
 use crate::scene::emitter::{self, Emitter};
+use crate::scene::plugin::Object;
+use crate::scene::plugin::{Loader, find, unknown};
 use crate::scene::shape::Geometry;
 use crate::scene::{Bounds, Group, Shape, bsdf};
 use crate::scene::{sensor, shape};
@@ -54,7 +55,7 @@ pub const CONTAINERS: &[(&str, &str)] = &[
 
 impl Contents {
     /// Adds an emitter that belongs to no shape.
-    pub fn emitter(&mut self, object: &Object, loader: &mut Loader) -> Result<()> {
+    pub fn emitter(&mut self, object: &Object, loader: &mut FileLoader) -> Result<()> {
         let plugin = find(emitter::PLUGINS, object)?;
         let emitter = (plugin.make)(object, loader)?;
         let weight =
@@ -67,7 +68,7 @@ impl Contents {
     }
 
     /// Adds a shape, or the shapes that it consists of.
-    pub fn shape(&mut self, object: &Rc<Object>, loader: &mut Loader) -> Result<()> {
+    pub fn shape(&mut self, object: &Rc<Object>, loader: &mut FileLoader) -> Result<()> {
         match object.plugin.as_str() {
             "instance" => self.instance(object, loader),
             // Drawn by its instances only.
@@ -95,7 +96,7 @@ impl Contents {
         }
     }
 
-    fn instance(&mut self, object: &Rc<Object>, loader: &mut Loader) -> Result<()> {
+    fn instance(&mut self, object: &Rc<Object>, loader: &mut FileLoader) -> Result<()> {
         let to_world = loader.to_world(object)?;
         let groups = children(object, loader)?;
         let [group] = groups.as_slice() else {
@@ -115,7 +116,7 @@ impl Contents {
     }
 
     /// A group; its shapes are built when it is first instanced.
-    fn group(&mut self, object: &Rc<Object>, loader: &mut Loader) -> Result<&mut (Bounds, Group)> {
+    fn group(&mut self, object: &Rc<Object>, loader: &mut FileLoader) -> Result<&mut (Bounds, Group)> {
         let Groups { list, by_origin } = &mut self.groups;
         if let Some(&index) = by_origin.get(&Rc::as_ptr(object)) {
             return Ok(&mut list[index]);
@@ -142,7 +143,7 @@ impl Contents {
 }
 
 /// The shapes nested in an object.
-fn children(object: &Object, loader: &Loader) -> Result<Vec<Rc<Object>>> {
+fn children(object: &Object, loader: &FileLoader) -> Result<Vec<Rc<Object>>> {
     let mut found = Vec::new();
     for property in object.nested() {
         let nested = loader.resolve(property)?;
@@ -159,7 +160,7 @@ fn children(object: &Object, loader: &Loader) -> Result<Vec<Rc<Object>>> {
 type Lit = (Shape, Option<(Box<dyn Emitter>, Arc<str>, f32)>);
 
 /// A shape with its emitter, which will have the numbers given; none when it has no area.
-fn single(object: &Object, loader: &mut Loader, (shape_number, emitter_number): (u32, u32)) -> Result<Option<Lit>> {
+fn single(object: &Object, loader: &mut FileLoader, (shape_number, emitter_number): (u32, u32)) -> Result<Option<Lit>> {
     let plugin = find(shape::PLUGINS, object)?;
     let geometry = Arc::new((plugin.make)(object, loader)?);
     let (mut bsdf, mut radiance) = (None, None);
@@ -179,7 +180,7 @@ fn single(object: &Object, loader: &mut Loader, (shape_number, emitter_number): 
                 radiance = Some((loader.radiance(&nested, "radiance")?, nested.id.clone(), weight));
                 loader.all_used(&nested, "radiance")?;
             }
-            "sensor" => return Err(super::unknown(&nested, sensor::PLUGINS.iter().map(|(name, _)| *name))),
+            "sensor" => return Err(unknown(&nested, sensor::PLUGINS.iter().map(|(name, _)| *name))),
             other => {
                 let what = format!("{other} `{}` in a shape; it takes a bsdf and an area emitter", nested.plugin);
                 return Err(nested.loc.unsupported(what));
@@ -206,14 +207,14 @@ fn single(object: &Object, loader: &mut Loader, (shape_number, emitter_number): 
 }
 
 /// The factor of an emitter's chance to be sampled; `only_sampled`: no path meets it otherwise.
-fn sampling_weight(object: &Object, loader: &Loader, only_sampled: bool) -> Result<f32> {
+fn sampling_weight(object: &Object, loader: &FileLoader, only_sampled: bool) -> Result<f32> {
     let weight = object.float("sampling_weight", 1.0)?;
     let loc = object.loc_of("sampling_weight");
     if !(weight >= 0.0 && weight.is_finite()) {
         return Err(loc.invalid(format!("a `sampling_weight` of {weight}; it cannot be negative")));
     }
     if weight == 0.0 && only_sampled {
-        loader.warn(&loc, format!("`{}` with a `sampling_weight` of 0 gives no light", object.plugin))?;
+        loader.warn(&loc, &format!("`{}` with a `sampling_weight` of 0 gives no light", object.plugin))?;
     }
     Ok(weight)
 }

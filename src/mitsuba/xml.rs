@@ -8,9 +8,9 @@ use std::sync::Arc;
 
 use super::document::{self, Element};
 use super::folders::Folders;
-use super::props::{Object, Value};
 use super::warnings::Warnings;
 use crate::error::{Error, Result, SourceLoc};
+use crate::scene::plugin::{Object, Value};
 
 /// Includes nested deeper than this are taken for a loop.
 const MAX_INCLUDES: usize = 15;

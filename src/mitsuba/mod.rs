@@ -1,5 +1,5 @@
-//! Scene files to a [`Scene`]: `xml` reads the text into objects, the plugin tables of the sibling folders turn
-//! objects into shapes, materials and emitters. Everything that can fail fails here.
+//! Scene files of Mitsuba to a [`Scene`]: `xml` reads the text into objects, which the plugin tables of [`scene`](crate::scene) turn into
+//! shapes, materials and emitters. Everything that can fail fails here.
 
 mod contents;
 mod document;
@@ -8,11 +8,9 @@ mod folders;
 pub mod integrator;
 mod legacy;
 mod loader;
+#[doc(hidden)]
 pub mod mesh;
-pub mod props;
-pub mod spectrum;
 mod transform;
-pub mod values;
 mod view;
 mod warnings;
 mod xml;
@@ -26,15 +24,14 @@ use serde::{Deserialize, Serialize};
 
 pub use self::contents::CONTAINERS;
 use self::contents::Contents;
-pub use self::loader::Loader;
-pub use self::mesh::MeshData;
-use self::props::Object;
+use self::loader::FileLoader;
 pub use self::xml::Line;
 use self::xml::Source;
-use super::sensor::{self, Crop, FilmOptions, Sensor, SensorInfo};
-use super::{Integrator, Scene, SceneDescription, bsdf, emitter, shape, texture};
 use crate::error::{Error, Result, SourceLoc};
 use crate::math::rng;
+use crate::scene::plugin::{Object, UNSUPPORTED};
+use crate::scene::sensor::{self, Crop, FilmOptions, Sensor, SensorInfo};
+use crate::scene::{BuildOptions, Integrator, Scene, SceneDescription, bsdf, emitter, shape, texture};
 
 /// Options that override the scene file.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -56,11 +53,14 @@ pub struct Options {
     pub max_depth: Option<u32>,
     /// Whether the loader's warnings are errors.
     pub strict: bool,
-    /// Groups of emitters whose light is recorded by itself, as [`LightGroups::parse`](super::LightGroups::parse) reads them.
+    /// Groups of emitters whose light is recorded by itself, as [`LightGroups::parse`](crate::scene::LightGroups::parse) reads them.
     pub light_groups: Option<String>,
     /// Whether packets evaluate materials and skip texture coordinates in faster ways where they can. Without them a render has the same bits.
     #[serde(skip)]
     pub fast_paths: bool,
+    /// Whether every ray is kept, to measure the time of tracing alone.
+    #[serde(skip)]
+    pub log_rays: bool,
     /// Threads for building (0: all).
     pub threads: usize,
     /// Bytes of image textures to hold in memory; files beyond them are read tile by tile as they are needed.
@@ -80,20 +80,11 @@ impl Default for Options {
             strict: false,
             light_groups: None,
             fast_paths: true,
+            log_rays: false,
             threads: 0,
             texture_memory: 4 << 30,
         }
     }
-}
-
-/// One row of a plugin table: name, parameters and constructor.
-pub struct Plugin<T: 'static> {
-    /// The `type` in scene files.
-    pub name: &'static str,
-    /// Its properties, for messages and documentation.
-    pub parameters: &'static str,
-    /// Builds it from its object.
-    pub make: fn(&Object, &mut Loader) -> Result<T>,
 }
 
 /// Name of a scene file for people: the file's own, or that of the folder around a `scene.xml`.
@@ -145,18 +136,12 @@ fn load_tree(path: &Path, parse: &dyn Fn() -> Result<xml::Tree>, options: &Optio
         drop(scene);
         scene = build(path, parse()?, options, origin)?;
     }
-    if let Some(what) = view::clipped(&scene).filter(|_| !scene.sensors.is_empty()) {
+    if let Some(what) = view::clipped(&scene).filter(|_| !scene.sensors().is_empty()) {
         let loc = SourceLoc::file(path);
         if options.strict {
             return Err(loc.unsupported(what));
         }
-        scene.warnings.push(format!("{loc}: {what}"));
-    }
-    if let Some(groups) = &options.light_groups {
-        scene.group_lights(groups)?;
-    }
-    if !options.fast_paths {
-        scene.disable_fast_paths();
+        scene = scene.with_warning(format!("{loc}: {what}"));
     }
     Ok(scene)
 }
@@ -164,7 +149,7 @@ fn load_tree(path: &Path, parse: &dyn Fn() -> Result<xml::Tree>, options: &Optio
 fn build(path: &Path, tree: xml::Tree, options: &Options, origin: DVec3) -> Result<Scene> {
     let fingerprint = fingerprint(&tree, options);
     let objects = tree.objects.clone();
-    let mut loader = Loader::new(tree, options.texture_memory, origin);
+    let mut loader = FileLoader::new(tree, options.texture_memory, origin);
     let mut contents = Contents::default();
     let (mut sensors, mut integrators) = (Vec::new(), Vec::new());
     for object in &objects {
@@ -214,7 +199,13 @@ fn build(path: &Path, tree: xml::Tree, options: &Options, origin: DVec3) -> Resu
         files,
         warnings,
     };
-    Scene::build(parts, options.threads).map_err(|error| match error {
+    let build = BuildOptions {
+        threads: options.threads,
+        light_groups: options.light_groups.as_deref(),
+        fast_paths: options.fast_paths,
+        log_rays: options.log_rays,
+    };
+    Scene::build(parts, build).map_err(|error| match error {
         Error::BadData(what) => loc.invalid(what),
         other => other,
     })
@@ -256,53 +247,4 @@ fn fingerprint(tree: &xml::Tree, options: &Options) -> u64 {
     let texts =
         tree.sources.iter().chain(definitions).chain(&options.sensor).chain(&crop).chain(&overscan).chain(&depth);
     texts.flat_map(|text| text.bytes()).fold(0, |hash, byte| rng::combine(hash, u64::from(byte)))
-}
-
-/// Plugins of Mitsuba 3 that are not supported, with the reason or a replacement.
-pub const UNSUPPORTED: &[(&str, &str, &str)] = &[
-    ("emitter", "timed_sunsky", "use sunsky at one time of the day, or several pictures"),
-    ("emitter", "area", "it lights a shape: nest it in one, or give it an id and refer to it in one"),
-    ("emitter", "collimated", "paths from the camera never meet its single ray; use a narrow spot"),
-    ("emitter", "directionalarea", "paths from the camera never meet its parallel light; use a spot or an area"),
-    ("bsdf", "hair", "its scattering is not there; principled comes near"),
-    ("bsdf", "measured", "measured materials are not read; principled comes near"),
-    ("bsdf", "measured_polarized", "it is measured for polarized light, which is not traced; principled comes near"),
-    ("bsdf", "hk", "media are not supported"),
-    ("bsdf", "difftrans", "principledthin with diff_trans comes near"),
-    ("bsdf", "irawan", "woven cloth is not read; roughdiffuse comes near"),
-    ("shape", "hair", "its files are not read; export it as a bsplinecurve or a linearcurve"),
-    ("shape", "heightfield", "export it as a mesh"),
-    ("shape", "sdfgrid", "distance fields are not traced; export them as a mesh"),
-    ("shape", "ellipsoids", "splats are not traced"),
-    ("shape", "ellipsoidsmesh", "splats are not traced"),
-    (
-        "sensor",
-        "irradiancemeter",
-        "it measures what a surface receives, and makes no picture; use perspective or orthographic",
-    ),
-    ("sensor", "radiancemeter", "it measures along a single ray; use perspective with a narrow field of view"),
-    ("sensor", "fluxmeter", "it measures what a surface receives, and makes no picture"),
-    ("sensor", "distant", "it sees from infinitely far away; use orthographic"),
-    ("sensor", "batch", "it is several sensors in one: write them one by one and choose by --sensor"),
-    ("texture", "gridtexture", "use a checkerboard or an image"),
-    ("texture", "vertexcolors", "use mesh_attribute with the name vertex_color"),
-    ("texture", "wireframe", "edges of triangles are not drawn; use an image"),
-    ("texture", "curvature", "use an image"),
-    ("texture", "volume", "volumes are not supported"),
-];
-
-/// The table's row for an object, or an error that lists the known ones.
-pub fn find<'a, T>(table: &'a [Plugin<T>], object: &Object) -> Result<&'a Plugin<T>> {
-    let found = table.iter().find(|plugin| plugin.name == object.plugin);
-    found.ok_or_else(|| unknown(object, table.iter().map(|plugin| plugin.name)))
-}
-
-/// The error of a plugin that is none of those of a table.
-pub fn unknown(object: &Object, known: impl Iterator<Item = &'static str>) -> Error {
-    let (class, plugin) = (&object.class, &object.plugin);
-    let reason = UNSUPPORTED.iter().find(|(other, name, _)| other == class && name == plugin);
-    object.loc.unsupported(match reason {
-        Some((.., reason)) => format!("{class} `{plugin}` is not supported: {reason}"),
-        None => format!("{class} `{plugin}` is not known; there are {}", known.collect::<Vec<_>>().join(", ")),
-    })
 }

@@ -6,12 +6,13 @@ use std::rc::Rc;
 use glam::DMat4;
 
 use super::legacy::{self, Legacy};
-use super::props::{Object, Property, Value};
-use super::spectrum::Spectrum;
+use super::transform;
 use super::xml::{At, Parser};
-use super::{transform, values};
 use crate::error::{Error, Result, SourceLoc};
 use crate::math::Vec3;
+use crate::scene::plugin::values;
+use crate::scene::plugin::{Object, Property, Value};
+use crate::scene::spectrum::Spectrum;
 
 impl Parser {
     /// An element as a property of the one that it is in.

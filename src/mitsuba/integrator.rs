@@ -2,10 +2,10 @@
 
 use std::rc::Rc;
 
-use super::Loader;
-use super::props::Object;
+use super::loader::FileLoader;
 use crate::error::Result;
 use crate::scene::Integrator;
+use crate::scene::plugin::{Loader, Object};
 
 /// Plugins and their parameters.
 pub const PLUGINS: &[(&str, &str)] = &[
@@ -27,7 +27,7 @@ const SCHEDULING: &[&str] =
     &["samples_per_pass", "timeout", "block_size", "emitter_samples", "bsdf_samples", "shading_samples", "aovs"];
 
 /// Path depths of a scene: of its one integrator that no other one refers to.
-pub fn choose(integrators: &[&Rc<Object>], loader: &mut Loader) -> Result<Integrator> {
+pub fn choose(integrators: &[&Rc<Object>], loader: &mut FileLoader) -> Result<Integrator> {
     let mut inner: Vec<*const Object> = Vec::new();
     for property in integrators.iter().flat_map(|integrator| integrator.nested()) {
         inner.push(Rc::as_ptr(&loader.resolve(property)?));
@@ -42,7 +42,7 @@ pub fn choose(integrators: &[&Rc<Object>], loader: &mut Loader) -> Result<Integr
 }
 
 /// Path depths from an integrator.
-pub fn load(object: &Object, loader: &mut Loader) -> Result<Integrator> {
+pub fn load(object: &Object, loader: &mut FileLoader) -> Result<Integrator> {
     let plugin = object.plugin.as_str();
     object.ignore(SCHEDULING);
     let wrapped = wrapped(object, loader)?;
@@ -68,12 +68,12 @@ pub fn load(object: &Object, loader: &mut Loader) -> Result<Integrator> {
     let integrator = wrapped.unwrap_or(own);
     let depth = if integrator.max_depth == u32::MAX { "-1".into() } else { integrator.max_depth.to_string() };
     let what = format!("integrator `{plugin}` is not known here: the scene is path traced with max_depth {depth}");
-    loader.warn(&object.loc, what)?;
+    loader.warn(&object.loc, &what)?;
     Ok(integrator)
 }
 
 /// The depths of the first of the integrators nested in another one.
-fn wrapped(object: &Object, loader: &mut Loader) -> Result<Option<Integrator>> {
+fn wrapped(object: &Object, loader: &mut FileLoader) -> Result<Option<Integrator>> {
     let mut first = None;
     for property in object.nested() {
         let nested = loader.resolve(property)?;

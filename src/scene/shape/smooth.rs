@@ -2,8 +2,8 @@
 
 use std::collections::HashMap;
 
-use super::MeshData;
 use crate::math::{Vec2, Vec3};
+use crate::scene::plugin::MeshData;
 
 /// Drops a mesh's normals and splits its vertices where faces meet at more than `degrees`, so that the normals averaged
 /// over the faces of a vertex are those of a smooth part. Faces at one place are gathered around the first that is left.

@@ -8,14 +8,13 @@ use std::sync::Arc;
 
 use glam::{DMat4, DVec3};
 
-use super::mesh::{self, MeshData};
-use super::props::{Object, Property, Value};
-use super::{find, xml};
+use super::mesh;
+use super::xml;
 use crate::error::{Error, Result, SourceLoc};
 use crate::image::io::DataWindow;
 use crate::math::{Mat4, Rgb, Vec3};
 use crate::scene::bsdf::{self, Bsdf};
-use crate::scene::shape::Geometry;
+use crate::scene::plugin::{Loader, MeshData, Object, Property, Value, find};
 use crate::scene::texture::{self, Texture};
 
 /// Nesting deeper than this (a BSDF in a BSDF in ...) is taken for a loop of references.
@@ -24,7 +23,7 @@ const MAX_NESTING: usize = 32;
 const MAX_COST: usize = 1000;
 
 /// Builds objects, each shared one once.
-pub struct Loader {
+pub struct FileLoader {
     tree: xml::Tree,
     /// The file's position of the world's origin, or that of the group whose shapes are being built.
     origin: DVec3,
@@ -40,10 +39,10 @@ pub struct Loader {
     /// Objects that the current one is nested in.
     cost: usize,
     /// Textures that need to know all shapes.
-    pub attributes: Vec<texture::Unbound>,
+    attributes: Vec<texture::Unbound>,
 }
 
-impl Loader {
+impl FileLoader {
     /// A loader of the objects of a file, with so many bytes of memory for textures. Positions are those of the file less
     /// `origin`.
     pub fn new(tree: xml::Tree, texture_memory: u64, origin: DVec3) -> Self {
@@ -67,75 +66,12 @@ impl Loader {
         (self.attributes, self.files.into_inner().into_iter().collect(), self.tree.warnings.into_list())
     }
 
-    /// The property `to_world`: from the object's own coordinates to those of the world, or of the group that it is in.
-    pub fn to_world(&self, object: &Object) -> Result<Mat4> {
-        Ok((DMat4::from_translation(-self.origin) * object.exact_transform("to_world")?).as_mat4())
-    }
-
-    /// A position in the world.
-    pub fn position(&self, object: &Object, name: &str, default: Vec3) -> Result<Vec3> {
-        if object.get(name).is_none() {
-            return Ok(default);
-        }
-        Ok((object.vector(name, default)?.as_dvec3() - self.origin).as_vec3())
-    }
-
     /// Builds the shapes of a group, whose coordinates are its own.
     pub fn in_group<T>(&mut self, make: impl FnOnce(&mut Self) -> Result<T>) -> Result<T> {
         let origin = std::mem::take(&mut self.origin);
         let made = make(self);
         self.origin = origin;
         made
-    }
-
-    /// Warns that something does not mean what it says; fails where warnings are errors.
-    pub fn warn(&self, loc: &SourceLoc, what: impl Into<String>) -> Result<()> {
-        self.tree.warnings.add(loc, what)
-    }
-
-    /// Warns of every property of an object that was never read and might change the image.
-    pub fn warn_unused(&self, object: &Object) -> Result<()> {
-        object.unused().try_for_each(|property| {
-            let (class, plugin) = (&object.class, &object.plugin);
-            let name = match &property.value {
-                Value::Object(nested) => format!("the nested {} `{}`", nested.class, nested.plugin),
-                _ => format!("`{}`", property.name),
-            };
-            self.warn(&property.loc, format!("{name} of {class} `{plugin}` has no meaning here and is ignored"))
-        })
-    }
-
-    /// Fails on the first property that was never read; `supported` lists the known ones. In files of version 0.6 or before
-    /// plain values that nothing asks for are warnings, as for the programs that these were made for.
-    pub fn all_used(&self, object: &Object, supported: &str) -> Result<()> {
-        for property in object.unused() {
-            let (class, plugin) = (&object.class, &object.plugin);
-            let (what, is_value) = match &property.value {
-                Value::Object(nested) => {
-                    (format!("{class} `{plugin}` has no use for the {} here", nested.class), false)
-                }
-                Value::Reference(id) => (format!("{class} `{plugin}` has no use for `{id}` here"), false),
-                _ => (format!("{class} `{plugin}` has no property `{}`", property.name), true),
-            };
-            if object.legacy && is_value {
-                self.warn(&property.loc, format!("{what}: it is ignored; it takes: {supported}"))?;
-            } else {
-                return Err(property.loc.unsupported(format!("{what}; it takes: {supported}")));
-            }
-        }
-        Ok(())
-    }
-
-    /// The object a property holds or refers to.
-    pub fn resolve(&self, property: &Property) -> Result<Rc<Object>> {
-        match &property.value {
-            Value::Object(object) => Ok(Rc::clone(object)),
-            Value::Reference(id) => {
-                let found = self.tree.ids.get(id).cloned();
-                found.ok_or_else(|| property.loc.invalid(format!("nothing has the id `{id}`")))
-            }
-            _ => Err(property.loc.invalid(format!("`{}` must be a nested object", property.name))),
-        }
     }
 
     /// Builds something nested, unless it is nested in itself.
@@ -162,67 +98,6 @@ impl Loader {
         Ok((made, cost))
     }
 
-    /// Builds a BSDF, or gives the one already built from this object.
-    pub fn bsdf(&mut self, object: &Rc<Object>) -> Result<Arc<dyn Bsdf>> {
-        if let Some((bsdf, cost)) = self.bsdfs.get(&Rc::as_ptr(object)) {
-            self.cost += cost;
-            return Ok(Arc::clone(bsdf));
-        }
-        let plugin = find(bsdf::PLUGINS, object)?;
-        // Reflectances above one are the file's to avoid.
-        object.ignore(&["ensure_energy_conservation"]);
-        let (made, cost) = self.counted(object, |loader| (plugin.make)(object, loader))?;
-        self.all_used(object, plugin.parameters)?;
-        self.bsdfs.insert(Rc::as_ptr(object), (Arc::clone(&made), cost));
-        Ok(made)
-    }
-
-    /// The BSDFs nested in an object.
-    pub fn nested_bsdfs(&mut self, object: &Object) -> Result<Vec<Arc<dyn Bsdf>>> {
-        let mut found = Vec::new();
-        for property in object.nested() {
-            let nested = self.resolve(property)?;
-            if nested.class == "bsdf" {
-                property.take();
-                found.push(self.bsdf(&nested)?);
-            }
-        }
-        Ok(found)
-    }
-
-    /// The one BSDF nested in an object.
-    pub fn nested_bsdf(&mut self, object: &Object) -> Result<Arc<dyn Bsdf>> {
-        let mut found = self.nested_bsdfs(object)?;
-        match (found.pop(), found.is_empty()) {
-            (Some(bsdf), true) => Ok(bsdf),
-            _ => Err(object.loc.invalid(format!("bsdf `{}` needs exactly one nested bsdf", object.plugin))),
-        }
-    }
-
-    /// The one texture nested in an object, whatever its name.
-    pub fn nested_texture(&mut self, object: &Object) -> Result<Arc<dyn Texture>> {
-        let mut found = None;
-        for property in object.nested() {
-            let nested = self.resolve(property)?;
-            if nested.class == "texture" && found.is_none() {
-                property.take();
-                found = Some(self.texture_object(&nested)?);
-            }
-        }
-        found.ok_or_else(|| object.loc.invalid(format!("`{}` needs a nested texture", object.plugin)))
-    }
-
-    /// The property `name` as a texture: a colour, a number, or a nested texture.
-    pub fn texture(&mut self, object: &Object, name: &str, default: Rgb) -> Result<Arc<dyn Texture>> {
-        match object.get(name) {
-            Some(property) if matches!(property.value, Value::Object(_) | Value::Reference(_)) => {
-                let nested = self.resolve(property)?;
-                self.texture_object(&nested)
-            }
-            _ => Ok(Arc::new(texture::Constant(self.color(object, name, default)?))),
-        }
-    }
-
     /// The property `name` as a colour. A reflectance is none below zero, and above one is made so with a warning.
     fn color(&self, object: &Object, name: &str, default: Rgb) -> Result<Rgb> {
         let color = object.color(name, default)?;
@@ -237,29 +112,8 @@ impl Loader {
         if largest <= 1.0 {
             return Ok(color);
         }
-        self.warn(&object.loc_of(name), format!("`{name}` is more than one: it is scaled by {:.3}", 0.99 / largest))?;
+        self.warn(&object.loc_of(name), &format!("`{name}` is more than one: it is scaled by {:.3}", 0.99 / largest))?;
         Ok(color * (0.99 / largest))
-    }
-
-    /// The property `name` as emitted light, white when absent.
-    pub fn radiance(&mut self, object: &Object, name: &str) -> Result<Arc<dyn Texture>> {
-        match object.get(name) {
-            Some(property @ Property { value: Value::Object(_) | Value::Reference(_), .. }) => {
-                let nested = self.resolve(property)?;
-                match texture::spectra::curve(&nested)? {
-                    Some(spectrum) => Ok(Arc::new(texture::Constant(spectrum.emission()))),
-                    None => self.texture_object(&nested),
-                }
-            }
-            _ => Ok(Arc::new(texture::Constant(object.emission(name, Rgb::ONE)?))),
-        }
-    }
-
-    /// The same where it has to be a single colour.
-    pub fn uniform_radiance(&mut self, object: &Object, name: &str) -> Result<Rgb> {
-        let radiance = self.radiance(object, name)?;
-        let what = format!("a texture as the `{name}` of `{}`; it is one colour", object.plugin);
-        radiance.constant().ok_or_else(|| object.loc_of(name).unsupported(what))
     }
 
     /// Builds a texture, or gives the one already built from this object.
@@ -277,9 +131,141 @@ impl Loader {
         self.textures.insert(Rc::as_ptr(object), (Arc::clone(&made), cost));
         Ok(made)
     }
+}
 
-    /// The file that the property `filename` names, looked for in the scene's folders.
-    pub fn file(&self, object: &Object) -> Result<PathBuf> {
+impl Loader for FileLoader {
+    fn to_world(&self, object: &Object) -> Result<Mat4> {
+        Ok((DMat4::from_translation(-self.origin) * object.exact_transform("to_world")?).as_mat4())
+    }
+
+    fn position(&self, object: &Object, name: &str, default: Vec3) -> Result<Vec3> {
+        if object.get(name).is_none() {
+            return Ok(default);
+        }
+        Ok((object.vector(name, default)?.as_dvec3() - self.origin).as_vec3())
+    }
+
+    fn warn(&self, loc: &SourceLoc, what: &str) -> Result<()> {
+        self.tree.warnings.add(loc, what)
+    }
+
+    fn warn_unused(&self, object: &Object) -> Result<()> {
+        object.unused().try_for_each(|property| {
+            let (class, plugin) = (&object.class, &object.plugin);
+            let name = match &property.value {
+                Value::Object(nested) => format!("the nested {} `{}`", nested.class, nested.plugin),
+                _ => format!("`{}`", property.name),
+            };
+            self.warn(&property.loc, &format!("{name} of {class} `{plugin}` has no meaning here and is ignored"))
+        })
+    }
+
+    fn all_used(&self, object: &Object, supported: &str) -> Result<()> {
+        for property in object.unused() {
+            let (class, plugin) = (&object.class, &object.plugin);
+            let (what, is_value) = match &property.value {
+                Value::Object(nested) => {
+                    (format!("{class} `{plugin}` has no use for the {} here", nested.class), false)
+                }
+                Value::Reference(id) => (format!("{class} `{plugin}` has no use for `{id}` here"), false),
+                _ => (format!("{class} `{plugin}` has no property `{}`", property.name), true),
+            };
+            if object.legacy && is_value {
+                self.warn(&property.loc, &format!("{what}: it is ignored; it takes: {supported}"))?;
+            } else {
+                return Err(property.loc.unsupported(format!("{what}; it takes: {supported}")));
+            }
+        }
+        Ok(())
+    }
+
+    fn resolve(&self, property: &Property) -> Result<Rc<Object>> {
+        match &property.value {
+            Value::Object(object) => Ok(Rc::clone(object)),
+            Value::Reference(id) => {
+                let found = self.tree.ids.get(id).cloned();
+                found.ok_or_else(|| property.loc.invalid(format!("nothing has the id `{id}`")))
+            }
+            _ => Err(property.loc.invalid(format!("`{}` must be a nested object", property.name))),
+        }
+    }
+
+    fn bsdf(&mut self, object: &Rc<Object>) -> Result<Arc<dyn Bsdf>> {
+        if let Some((bsdf, cost)) = self.bsdfs.get(&Rc::as_ptr(object)) {
+            self.cost += cost;
+            return Ok(Arc::clone(bsdf));
+        }
+        let plugin = find(bsdf::PLUGINS, object)?;
+        // Reflectances above one are the file's to avoid.
+        object.ignore(&["ensure_energy_conservation"]);
+        let (made, cost) = self.counted(object, |loader| (plugin.make)(object, loader))?;
+        self.all_used(object, plugin.parameters)?;
+        self.bsdfs.insert(Rc::as_ptr(object), (Arc::clone(&made), cost));
+        Ok(made)
+    }
+
+    fn nested_bsdfs(&mut self, object: &Object) -> Result<Vec<Arc<dyn Bsdf>>> {
+        let mut found = Vec::new();
+        for property in object.nested() {
+            let nested = self.resolve(property)?;
+            if nested.class == "bsdf" {
+                property.take();
+                found.push(self.bsdf(&nested)?);
+            }
+        }
+        Ok(found)
+    }
+
+    fn nested_bsdf(&mut self, object: &Object) -> Result<Arc<dyn Bsdf>> {
+        let mut found = self.nested_bsdfs(object)?;
+        match (found.pop(), found.is_empty()) {
+            (Some(bsdf), true) => Ok(bsdf),
+            _ => Err(object.loc.invalid(format!("bsdf `{}` needs exactly one nested bsdf", object.plugin))),
+        }
+    }
+
+    fn nested_texture(&mut self, object: &Object) -> Result<Arc<dyn Texture>> {
+        let mut found = None;
+        for property in object.nested() {
+            let nested = self.resolve(property)?;
+            if nested.class == "texture" && found.is_none() {
+                property.take();
+                found = Some(self.texture_object(&nested)?);
+            }
+        }
+        found.ok_or_else(|| object.loc.invalid(format!("`{}` needs a nested texture", object.plugin)))
+    }
+
+    fn texture(&mut self, object: &Object, name: &str, default: Rgb) -> Result<Arc<dyn Texture>> {
+        match object.get(name) {
+            Some(property) if matches!(property.value, Value::Object(_) | Value::Reference(_)) => {
+                let nested = self.resolve(property)?;
+                self.texture_object(&nested)
+            }
+            _ => Ok(Arc::new(texture::Constant(self.color(object, name, default)?))),
+        }
+    }
+
+    fn radiance(&mut self, object: &Object, name: &str) -> Result<Arc<dyn Texture>> {
+        match object.get(name) {
+            Some(property @ Property { value: Value::Object(_) | Value::Reference(_), .. }) => {
+                let nested = self.resolve(property)?;
+                match texture::spectra::curve(&nested)? {
+                    Some(spectrum) => Ok(Arc::new(texture::Constant(spectrum.emission()))),
+                    None => self.texture_object(&nested),
+                }
+            }
+            _ => Ok(Arc::new(texture::Constant(object.emission(name, Rgb::ONE)?))),
+        }
+    }
+
+    fn uniform_radiance(&mut self, object: &Object, name: &str) -> Result<Rgb> {
+        let radiance = self.radiance(object, name)?;
+        let what = format!("a texture as the `{name}` of `{}`; it is one colour", object.plugin);
+        radiance.constant().ok_or_else(|| object.loc_of(name).unsupported(what))
+    }
+
+    fn file(&self, object: &Object) -> Result<PathBuf> {
         let name = object.string("filename", "")?;
         if name.is_empty() {
             return Err(object.loc.invalid(format!("{} `{}` needs a `filename`", object.class, object.plugin)));
@@ -291,8 +277,7 @@ impl Loader {
         Ok(found)
     }
 
-    /// The texels of the image file that an object names, each selection read once.
-    pub fn texels(&mut self, object: &Object, selection: texture::Selection) -> Result<Arc<texture::Texels>> {
+    fn texels(&mut self, object: &Object, selection: texture::Selection) -> Result<Arc<texture::Texels>> {
         let path = self.file(object)?;
         let read = self.bitmaps.entry(path.clone()).or_default();
         if let Some((_, texels)) = read.iter().find(|(known, _)| *known == selection) {
@@ -304,21 +289,20 @@ impl Loader {
             let what = format!("the file has {w}x{h} pixels at {x},{y} of a picture of {width}x{height}");
             self.warn(
                 &SourceLoc::file(&path),
-                format!("{what}: they are stretched over the whole texture, as by Mitsuba"),
+                &format!("{what}: they are stretched over the whole texture, as by Mitsuba"),
             )?;
         }
         let infinite = odd.infinite;
         if infinite > 0 {
             let what = format!("{infinite} texels are not finite: infinity counts as 65504, what is no number as zero");
-            self.warn(&SourceLoc::file(&path), what)?;
+            self.warn(&SourceLoc::file(&path), &what)?;
         }
         let texels = Arc::new(texels);
         self.bitmaps.entry(path).or_default().push((selection, Arc::clone(&texels)));
         Ok(texels)
     }
 
-    /// The mesh of a shape object whose type is a format of meshes.
-    pub fn mesh(&mut self, object: &Object) -> Result<MeshData> {
+    fn mesh(&mut self, object: &Object) -> Result<MeshData> {
         let path = self.file(object)?;
         let bytes = |path: &Path| std::fs::read(path).map_err(|error| Error::io(path, error));
         if object.plugin != "serialized" {
@@ -333,8 +317,7 @@ impl Loader {
         mesh::read(&object.plugin, &self.meshes[&path], index, &path)
     }
 
-    /// A geometry whose transform or numbers leave the range of floats cannot be traced.
-    pub fn finite(&self, object: &Object, geometry: Geometry) -> Result<Geometry> {
-        if geometry.bounds().is_finite() { Ok(geometry) } else { Err(object.loc.invalid("coordinates are not finite")) }
+    fn bind_later(&mut self, attribute: texture::Unbound) {
+        self.attributes.push(attribute);
     }
 }

@@ -3,10 +3,10 @@
 use std::collections::HashMap;
 use std::path::Path;
 
-use super::MeshData;
 use super::polygon::Triangulation;
 use crate::error::{Result, SourceLoc};
 use crate::math::{Vec2, Vec3, vec2, vec3};
+use crate::scene::plugin::MeshData;
 
 /// Position, texture coordinate and normal of a corner, as numbers from 0.
 type Corner = (usize, Option<usize>, Option<usize>);

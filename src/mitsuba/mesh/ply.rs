@@ -5,10 +5,10 @@ use std::path::Path;
 use ply_rs_bw::parser::{ParseError, Parser, Reader};
 use ply_rs_bw::ply::{ElementDef, Encoding, Header, Property, PropertyAccess, PropertyAccessResult, PropertyType};
 
-use super::MeshData;
 use super::polygon::Triangulation;
 use crate::error::{Result, SourceLoc};
 use crate::math::{Rgb, Vec3, vec2};
+use crate::scene::plugin::MeshData;
 
 /// Columns with a meaning of their own.
 const POSITION: &[&str] = &["x", "y", "z", "nx", "ny", "nz"];

@@ -5,9 +5,9 @@ use std::rc::Rc;
 
 use glam::DMat4;
 
-use super::spectrum::Spectrum;
 use crate::error::{Error, Result, SourceLoc};
 use crate::math::{Mat4, Rgb, Vec3};
+use crate::scene::spectrum::Spectrum;
 
 /// A property's value.
 #[derive(Clone, Debug)]
@@ -173,7 +173,7 @@ impl Object {
         }
     }
 
-    /// A transform of directions or of texture coordinates, which must be invertible. [`super::Loader::to_world`] has those
+    /// A transform of directions or of texture coordinates, which must be invertible. [`to_world`](super::Loader::to_world) has those
     /// of positions in the world.
     pub fn transform(&self, name: &str) -> Result<Mat4> {
         Ok(self.exact_transform(name)?.as_mat4())

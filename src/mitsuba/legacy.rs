@@ -1,9 +1,9 @@
 //! Names of scene files up to version 0.6, as version 3 has them.
 
-use super::props::{Property, Value};
 use super::transform;
 use crate::error::SourceLoc;
 use crate::math::vec3;
+use crate::scene::plugin::{Property, Value};
 
 /// `toWorld` as `to_world`, `intIOR` as `int_ior`.
 pub fn snake_case(name: &str) -> String {
