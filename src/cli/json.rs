@@ -12,7 +12,7 @@ use super::terminal::out;
 /// Name that means standard output.
 const STDOUT: &str = "-";
 
-/// Where JSON goes.
+/// File of a command's figures.
 #[derive(Clone, Debug, Default, clap::Args)]
 pub struct Args {
     /// JSON file for the figures; - is standard output

@@ -4,7 +4,6 @@ pub mod channels;
 pub mod io;
 pub mod nl_means;
 pub mod npy;
-pub mod oidn;
 pub mod planes;
 #[cfg(any(test, not(feature = "openimageio")))]
 mod pure;

@@ -150,25 +150,7 @@ fn build(path: &Path, tree: xml::Tree, options: &Options, origin: DVec3) -> Resu
     let fingerprint = fingerprint(&tree, options);
     let objects = tree.objects.clone();
     let mut loader = FileLoader::new(tree, options.texture_memory, origin);
-    let mut contents = Contents::default();
-    let (mut sensors, mut integrators) = (Vec::new(), Vec::new());
-    for object in &objects {
-        match object.class.as_str() {
-            "shape" => contents.shape(object, &mut loader)?,
-            // A lamp that shapes refer to.
-            "emitter" if object.plugin == "area" && object.id.is_some() => {}
-            "emitter" => contents.emitter(object, &mut loader)?,
-            "sensor" => sensors.push(object),
-            "integrator" => integrators.push(object),
-            // Named objects that nothing uses are allowed, and need not even be understood.
-            "bsdf" | "texture" | "film" | "sampler" | "rfilter" => {}
-            "medium" | "volume" | "phase" if object.id.is_some() => {}
-            other => {
-                let known = "shape, bsdf, texture, emitter, sensor, integrator, film, sampler";
-                return Err(object.loc.unsupported(format!("<{other}> in a scene; there are {known}")));
-            }
-        }
-    }
+    let Gathered { contents, sensors, integrators } = gather(&objects, &mut loader)?;
     let loc = SourceLoc::file(path);
     let sensor = match choose(&sensors, options, &loc)? {
         Some(object) => {
@@ -209,6 +191,37 @@ fn build(path: &Path, tree: xml::Tree, options: &Options, origin: DVec3) -> Resu
         Error::BadData(what) => loc.invalid(what),
         other => other,
     })
+}
+
+/// Objects of a scene: those that are built at once, and those of which one is chosen.
+#[derive(Default)]
+struct Gathered<'a> {
+    contents: Contents,
+    sensors: Vec<&'a Rc<Object>>,
+    integrators: Vec<&'a Rc<Object>>,
+}
+
+/// Builds shapes and emitters.
+fn gather<'a>(objects: &'a [Rc<Object>], loader: &mut FileLoader) -> Result<Gathered<'a>> {
+    let mut gathered = Gathered::default();
+    for object in objects {
+        match object.class.as_str() {
+            "shape" => gathered.contents.shape(object, loader)?,
+            // A lamp that shapes refer to.
+            "emitter" if object.plugin == "area" && object.id.is_some() => {}
+            "emitter" => gathered.contents.emitter(object, loader)?,
+            "sensor" => gathered.sensors.push(object),
+            "integrator" => gathered.integrators.push(object),
+            // Named objects that nothing uses are allowed, and need not even be understood.
+            "bsdf" | "texture" | "film" | "sampler" | "rfilter" => {}
+            "medium" | "volume" | "phase" if object.id.is_some() => {}
+            other => {
+                let known = "shape, bsdf, texture, emitter, sensor, integrator, film, sampler";
+                return Err(object.loc.unsupported(format!("<{other}> in a scene; there are {known}")));
+            }
+        }
+    }
+    Ok(gathered)
 }
 
 /// The sensor that is to render; `None` if there need not be one.

@@ -4,8 +4,8 @@
 
 use rayon::prelude::*;
 
-use super::edge_means::{self, Missing};
-use super::inputs::{Inputs, check_memory};
+use super::common::edge_means::{self, Missing};
+use super::common::inputs::{Inputs, check_memory};
 use super::{Context, Method, Note, Parameter, Parameters, Reconstruction, Solution, Traits};
 use crate::error::{Error, Result};
 use crate::film::{EdgeParts, Edges, Frame, HalfEdge, Layer, Needs, Recorded, half};

@@ -1,8 +1,8 @@
 //! The feature generated from differences, as an image: a screened Poisson reconstruction with inverse variances as weights,
 //! cleaned of the noise that is left.
 
-use super::generated::{self, Options};
-use super::inputs::{Inputs, check_memory};
+use super::common::generated::{self, Options};
+use super::common::inputs::{Inputs, check_memory};
 use super::{Context, EdgeTrust, Method, Parameters, Reconstruction, Solution, Traits};
 use crate::error::Result;
 use crate::film::{Frame, Needs};

@@ -2,12 +2,11 @@
 //! counts by its size and not by its square, so that outliers do not spread. The result is like a median: biased, and
 //! consistent.
 
-use super::inputs::{Inputs, check_memory};
+use super::common::problem::Problem;
 use super::{Context, Method, Parameter, Parameters, Reconstruction, Solution, Traits};
 use crate::error::Result;
-use crate::film::{EdgeParts, Frame, Layer, Needs};
+use crate::film::{Frame, Needs};
 use crate::solve::irls;
-use crate::solve::poisson::Targets;
 
 /// `l1`.
 pub const METHOD: Method = Method {
@@ -45,9 +44,17 @@ fn make(parameters: &Parameters) -> Result<Box<dyn Reconstruction>> {
     }))
 }
 
-struct L1 {
+/// The solver with its parameters.
+pub struct L1 {
     alpha: f32,
     options: irls::Options,
+}
+
+impl Default for L1 {
+    /// The parameters of `l1`.
+    fn default() -> Self {
+        Self { alpha: 0.2, options: irls::Options { iterations: 5, epsilon: 0.05, decay: 0.3 } }
+    }
 }
 
 impl Reconstruction for L1 {
@@ -56,13 +63,8 @@ impl Reconstruction for L1 {
     }
 
     fn reconstruct(&self, frame: &Frame, context: &Context) -> Result<Solution> {
-        let inputs = Inputs::new(frame, 1)?;
-        check_memory(frame, context, METHOD.id, BYTES)?;
-        let data = inputs.quads(Layer::Color)?;
-        let edges = frame.edges(EdgeParts::default())?;
-        let differences = inputs.differences(&edges);
-        let targets = Targets { edges: &edges, data: &data, differences: &differences };
-        let solution = irls::solve(targets, &vec![1.0; edges.len()], self.alpha, self.options);
-        Ok(Solution { image: inputs.image(&solution), alpha: None, error: None, notes: Vec::new() })
+        let problem = Problem::new(frame, context, (METHOD.id, BYTES))?;
+        let solution = irls::solve(problem.targets(), &vec![1.0; problem.edges.len()], self.alpha, self.options);
+        Ok(Solution { image: problem.inputs.image(&solution), alpha: None, error: None, notes: Vec::new() })
     }
 }

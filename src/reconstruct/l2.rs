@@ -9,7 +9,7 @@
 
 use rayon::prelude::*;
 
-use super::inputs::{Inputs, check_memory};
+use super::common::inputs::{Inputs, check_memory};
 use super::{Context, Method, Parameter, Parameters, Reconstruction, Solution, Traits};
 use crate::error::Result;
 use crate::film::{Cross, EdgeParts, Frame, Layer, Needs};

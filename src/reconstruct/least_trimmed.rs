@@ -4,10 +4,11 @@
 
 use rayon::prelude::*;
 
-use super::inputs::{Inputs, check_memory, quads};
+use super::common::inputs::{Inputs, quads};
+use super::common::problem::Problem;
 use super::{Context, Method, Parameter, Parameters, Reconstruction, Solution, Traits};
 use crate::error::Result;
-use crate::film::{EdgeParts, Edges, Frame, Layer, Needs};
+use crate::film::{Edges, Frame, Needs};
 use crate::image::nl_means::{self, Guide, Guides, NlmSettings};
 use crate::image::planes::{Planes, mirror};
 use crate::solve::graph::Quad;
@@ -67,14 +68,10 @@ impl Reconstruction for LeastTrimmed {
     }
 
     fn reconstruct(&self, frame: &Frame, context: &Context) -> Result<Solution> {
-        let inputs = Inputs::new(frame, 1)?;
-        check_memory(frame, context, METHOD.id, BYTES)?;
-        let data = inputs.quads(Layer::Color)?;
-        let edges = frame.edges(EdgeParts::default())?;
-        let differences = inputs.differences(&edges);
-        let targets = Targets { edges: &edges, data: &data, differences: &differences };
+        let problem = Problem::new(frame, context, (METHOD.id, BYTES))?;
+        let (Problem { inputs, edges, data, .. }, targets) = (&problem, problem.targets());
         (context.progress)("denoise", 0.0);
-        let denoised = self.denoise(&inputs, &edges)?;
+        let denoised = self.denoise(inputs, edges)?;
         let order = order(targets, &denoised.differences);
         let mut best: Option<(f64, Vec<f32>)> = None;
         let mut solution = data.clone();

@@ -3,14 +3,15 @@
 
 use std::ops::Range;
 
-use super::inputs::Inputs;
-use super::{Note, Reconstruction, Solution, parse};
+use super::common::inputs::Inputs;
+use super::nlm::Nlm;
+use super::{Note, Reconstruction, Solution};
 use crate::error::{Error, Result};
 use crate::film::{Frame, Layer, LightLayers};
 use crate::image::Image;
 
-/// Method whose weights filter the groups' light where a method has none of its own.
-const FILTER: &str = "nlm:window=6";
+/// Radius of the window of the non-local means that filter the groups' light where a method has no weights of its own.
+const WINDOW: usize = 6;
 /// Times that they do: single bright samples of a group become hills instead of squares as large as the window.
 const PASSES: usize = 2;
 
@@ -23,7 +24,7 @@ pub fn groups(method: &dyn Reconstruction, frame: &Frame, solution: &Solution) -
     let filtered = match method.filter(frame, &all)? {
         Some(filtered) => filtered,
         None => {
-            let filter = parse(FILTER)?;
+            let filter = Nlm::of_window(WINDOW);
             (0..PASSES).try_fold(all, |all, _| Ok::<_, Error>(filter.filter(frame, &all)?.unwrap_or(all)))?
         }
     };

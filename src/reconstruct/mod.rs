@@ -2,15 +2,11 @@
 
 mod apr;
 mod blend;
-mod compressed;
+mod common;
 mod control_variate;
-mod edge_means;
 mod feature;
-mod features;
 mod frgr;
-mod generated;
 mod gradnet;
-mod inputs;
 mod l1;
 mod l2;
 mod least_trimmed;
@@ -22,7 +18,6 @@ mod oidn;
 mod parameters;
 mod primal;
 mod rdfc;
-mod residual;
 
 pub use self::lights::groups as light_groups;
 pub use self::parameters::Parameters;

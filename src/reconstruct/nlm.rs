@@ -1,8 +1,8 @@
 //! Non-local means (Buades et al. 2005, with the distance of Rousselle et al. 2012), of the colour alone or with
 //! features. It needs no gradients.
 
-use super::features::{Feature, Kind, without_features};
-use super::inputs::{Inputs, check_memory};
+use super::common::features::{Feature, Kind, without_features};
+use super::common::inputs::{Inputs, check_memory};
 use super::{Context, Method, Parameter, Parameters, Reconstruction, Solution, Traits};
 use crate::error::Result;
 use crate::film::{Frame, Needs, Recorded};
@@ -49,7 +49,8 @@ fn make(parameters: &Parameters) -> Result<Box<dyn Reconstruction>> {
 /// Features that pixels are compared by.
 const KINDS: [Kind; 2] = [Kind::Albedo, Kind::Normal];
 
-struct Nlm {
+/// The filter with its parameters.
+pub struct Nlm {
     features: bool,
     settings: NlmSettings,
 }
@@ -65,6 +66,13 @@ impl Nlm {
             }
         }
         Ok(Guides { color: inputs.guide()?, features })
+    }
+}
+
+impl Nlm {
+    /// `nlm` with a window of another radius.
+    pub fn of_window(window: usize) -> Self {
+        Self { features: true, settings: NlmSettings { window, patch: 3, color: 0.45, feature: Some(FEATURE) } }
     }
 }
 

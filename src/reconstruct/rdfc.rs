@@ -1,7 +1,7 @@
 //! Robust denoising using feature and colour information (Rousselle et al. 2013) by itself. It needs no gradients.
 
-use super::features::{Feature, Kind};
-use super::inputs::{Inputs, check_memory};
+use super::common::features::{Feature, Kind};
+use super::common::inputs::{Inputs, check_memory};
 use super::{Context, Method, Parameter, Parameters, Reconstruction, Solution, Traits};
 use crate::error::Result;
 use crate::film::{Frame, Needs, Recorded};

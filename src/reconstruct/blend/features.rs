@@ -5,8 +5,8 @@ use crate::error::Result;
 use crate::film::Layer;
 use crate::image::planes::Planes;
 use crate::nn::Tensor;
-use crate::reconstruct::inputs::Inputs;
-use crate::reconstruct::residual::{estimated_error, mean, noise, squared_error, trust, windowed};
+use crate::reconstruct::common::inputs::Inputs;
+use crate::reconstruct::common::residual::{estimated_error, mean, noise, squared_error, trust, windowed};
 
 /// Radius of the window that residuals are averaged over, by themselves.
 const RESIDUAL: usize = 3;

@@ -15,10 +15,14 @@
 mod features;
 mod network;
 
+use std::sync::OnceLock;
+
 use self::features::Evidence;
 use self::network::Network;
-use super::inputs::{Inputs, NET_BYTES, check_memory};
-use super::{Context, EdgeTrust, Method, Note, Parameter, Parameters, Reconstruction, Solution, Traits, parse};
+use super::common::inputs::{Inputs, NET_BYTES, check_memory};
+use super::frgr::{Frgr, NearOidn, Outcome};
+use super::net::{self, Corrected, Net};
+use super::{Context, EdgeTrust, Method, Note, Parameter, Parameters, Reconstruction, Solution, Traits};
 use crate::error::{Error, Result};
 use crate::film::{Frame, Layer, Needs};
 use crate::image::Image;
@@ -51,41 +55,72 @@ const CANDIDATE: u64 = 12;
 /// An upper bound of all, which `net` takes most of; less is held while images are mixed.
 const BYTES: u64 = NET_BYTES + NOTES + 5 * CANDIDATE;
 
-/// Methods, and those of their intermediate images that are candidates beside their own.
-type Candidates = &'static [(&'static str, &'static [&'static str])];
-
-const CANDIDATES: Candidates = &[("frgr:denoiser=oidn,filter=off", &["denoised"]), ("net:image=safe", &["frgr"])];
-
 /// The trained network for these.
 const WEIGHTS: &[u8] = include_bytes!("oidn.safetensors");
 
+/// Position of `net`'s image among the candidates.
+const BEST: usize = 2;
+
+/// Number of candidates: the first method's image and the image that it is near, those of `net` and `frgr`, and the sampled colours.
+const COUNT: usize = 5;
+
+/// A method that enhances an image of another one, and gives both.
+trait Enhancer: Send + Sync {
+    fn needs(&self) -> Needs;
+    fn run(&self, frame: &Frame, context: &Context) -> Result<Outcome>;
+}
+
+impl Enhancer for NearOidn {
+    fn needs(&self) -> Needs {
+        Reconstruction::needs(self)
+    }
+
+    fn run(&self, frame: &Frame, context: &Context) -> Result<Outcome> {
+        Self::run(self, frame, context)
+    }
+}
+
 struct Blend {
-    methods: Vec<(Box<dyn Reconstruction>, &'static [&'static str])>,
-    network: Network,
+    enhancer: Box<dyn Enhancer>,
+    net: Net,
+    network: &'static Network,
     safety: bool,
 }
 
 fn make(parameters: &Parameters) -> Result<Box<dyn Reconstruction>> {
     let safety = parameters.switch("safety")?;
     if parameters.switch("oidn")? {
-        return Ok(Box::new(Blend::new(CANDIDATES, safety)?));
+        return Ok(Box::new(Blend::new(Box::new(NearOidn::new(Frgr::default().unfiltered())?), safety)?));
     }
-    parse(if safety { "net" } else { "net:image=network" })
+    Ok(if safety { Box::new(net::by_default()?) } else { Box::new(Net::new(false)?) })
 }
 
 impl Blend {
-    fn new(candidates: Candidates, safety: bool) -> Result<Self> {
-        let make = |(method, notes): &(&str, &'static [&'static str])| Ok((parse(method)?, *notes));
-        let methods = candidates.iter().map(make).collect::<Result<Vec<_>>>()?;
-        let count = 1 + candidates.iter().map(|(_, notes)| 1 + notes.len()).sum::<usize>();
-        let network = Network::new(WEIGHTS, count).map_err(|why| Error::backend(METHOD.id, why))?;
-        Ok(Self { methods, network, safety })
+    fn new(enhancer: Box<dyn Enhancer>, safety: bool) -> Result<Self> {
+        static NETWORK: OnceLock<Result<Network, String>> = OnceLock::new();
+        let network = NETWORK.get_or_init(|| Network::new(WEIGHTS, COUNT));
+        let network = network.as_ref().map_err(|why| Error::backend(METHOD.id, why))?;
+        Ok(Self { enhancer, net: Net::new(true)?, network, safety })
+    }
+
+    /// The images to be mixed, and the expected squared error of the last method's. `held` bytes besides the images are counted.
+    fn candidates(&self, frame: &Frame, context: &Context) -> Result<(Vec<Image>, Option<Image>)> {
+        let pixels = (frame.width * frame.height) as u64;
+        let part = |k: f32| move |what: &str, done: f32| (context.progress)(what, 0.45 * (k + done));
+        let (first, second) = (part(0.0), part(1.0));
+        let Outcome { solution: enhanced, denoised, .. } = context.beside(NOTES * pixels, |memory| {
+            self.enhancer.run(frame, &Context { progress: &first, memory, notes: false })
+        })?;
+        let Corrected { image, frgr, error, .. } = context.beside((NOTES + 2 * CANDIDATE) * pixels, |memory| {
+            self.net.image(frame, &Context { progress: &second, memory, notes: false })
+        })?;
+        Ok((vec![enhanced.image, denoised, image, frgr, frame.require(Layer::Color)?.clone()], error))
     }
 }
 
 impl Reconstruction for Blend {
     fn needs(&self) -> Needs {
-        self.methods.iter().fold(Needs::default(), |needs, (method, _)| needs.union(method.needs()))
+        self.enhancer.needs().union(self.net.needs())
     }
 
     fn estimates_error(&self) -> bool {
@@ -97,7 +132,7 @@ impl Reconstruction for Blend {
     }
 
     fn guide(&self) -> Option<&dyn Reconstruction> {
-        self.methods.last().and_then(|(method, _)| method.guide())
+        self.net.guide()
     }
 
     fn reconstruct(&self, frame: &Frame, context: &Context) -> Result<Solution> {
@@ -108,26 +143,11 @@ impl Reconstruction for Blend {
             frame.cross()?;
         }
         frame.require(Layer::Albedo)?;
-        let pixels = (frame.width * frame.height) as u64;
-        let (mut candidates, mut best, mut error) = (Vec::new(), 0, None);
-        for (k, (method, notes)) in self.methods.iter().enumerate() {
-            let share = 0.9 / self.methods.len() as f32;
-            let report = |what: &str, done: f32| (context.progress)(what, (k as f32 + done) * share);
-            let held = pixels * (NOTES + CANDIDATE * candidates.len() as u64);
-            let solution = context.beside(held, |memory| {
-                method.reconstruct(frame, &Context { progress: &report, memory, notes: true })
-            })?;
-            best = candidates.len();
-            let inner: Vec<Image> = notes.iter().filter_map(|name| solution.note(name).cloned()).collect();
-            error = solution.error;
-            candidates.push(solution.image);
-            candidates.extend(inner);
-        }
-        candidates.push(frame.require(Layer::Color)?.clone());
+        let (candidates, error) = self.candidates(frame, context)?;
         (context.progress)("blend", 0.9);
         let images: Vec<_> = candidates.iter().map(|image| inputs.mirrored(image, inputs.scale)).collect();
         drop(candidates);
-        let evidence = Evidence::new(&inputs, &images, best)?;
+        let evidence = Evidence::new(&inputs, &images, BEST)?;
         let weights = self.network.weights(&evidence.features(inputs.told_samples()));
         let kept = if self.safety { evidence.safe(weights, inputs.spp) } else { weights };
         let notes = if context.notes { notes(&kept, &inputs) } else { Vec::new() };
@@ -159,13 +179,27 @@ fn notes(weights: &Planes, inputs: &Inputs) -> Vec<Note> {
 mod tests {
     use super::*;
     use crate::math::vec3;
-    use crate::reconstruct::solve;
+    use crate::reconstruct::{parse, solve};
     use crate::synthetic::{Distribution, Noise, change, noisy, picture};
 
     const SIZE: (usize, usize) = (48, 40);
 
     /// As with Open Image Denoise, whose place non-local means take.
-    const STAND_IN: Candidates = &[("frgr:filter=off", &["denoised"]), ("net:image=safe", &["frgr"])];
+    struct StandIn(Frgr);
+
+    impl Enhancer for StandIn {
+        fn needs(&self) -> Needs {
+            self.0.needs()
+        }
+
+        fn run(&self, frame: &Frame, context: &Context) -> Result<Outcome> {
+            self.0.run(&self.0.begin(frame, context)?, context)
+        }
+    }
+
+    fn stand_in(safety: bool) -> Blend {
+        Blend::new(Box::new(StandIn(Frgr::default().unfiltered())), safety).unwrap()
+    }
 
     fn frame(truth: &Image, noise: f32, edge: f32, seed: u64) -> Frame {
         noisy(truth, Noise { color: noise, edge, distribution: Distribution::Normal }, seed)
@@ -187,7 +221,7 @@ mod tests {
         let (denoised, colors) = (enhanced.note("denoised").unwrap(), frame.get(Layer::Color).unwrap());
         let candidates = [&enhanced.image, denoised, &net.image, &frgr.image, colors];
         for safety in [true, false] {
-            let blend = solved(&Blend::new(STAND_IN, safety).unwrap(), &frame);
+            let blend = solved(&stand_in(safety), &frame);
             for (i, value) in blend.image.data.iter().enumerate() {
                 let of =
                     |choose: fn(f32, f32) -> f32| candidates.iter().map(|image| image.data[i]).reduce(choose).unwrap();
@@ -201,7 +235,7 @@ mod tests {
 
     #[test]
     fn errors_fall_with_the_noise_and_their_estimates_with_them() {
-        let (truth, blend) = (picture(SIZE), Blend::new(STAND_IN, true).unwrap());
+        let (truth, blend) = (picture(SIZE), stand_in(true));
         let [coarse, fine] = [0.4, 0.05].map(|noise| {
             let solutions = [1, 2, 3].map(|seed| solved(&blend, &frame(&truth, noise, 0.3 * noise, seed)));
             let error = solutions.iter().map(|solution| mse(&solution.image, &truth)).sum::<f64>() / 3.0;
@@ -221,8 +255,7 @@ mod tests {
         let truth = Image::from_rgb(SIZE.0, SIZE.1, pattern);
         let mut frame = frame(&truth, 1e-3, 1e-4, 4);
         [Layer::Dx, Layer::Dy].into_iter().for_each(|layer| change(&mut frame, layer, |_, _| 0.0));
-        let [safe, free] =
-            [true, false].map(|safety| mse(&solved(&Blend::new(STAND_IN, safety).unwrap(), &frame).image, &truth));
+        let [safe, free] = [true, false].map(|safety| mse(&solved(&stand_in(safety), &frame).image, &truth));
         assert!(safe < 1e-4 && free > 10.0 * safe, "{safe:.1e}, without the rule {free:.1e}");
     }
 

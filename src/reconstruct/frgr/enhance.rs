@@ -9,7 +9,7 @@ use super::level::Level;
 use crate::film::Edges;
 use crate::image::planes::Planes;
 use crate::math::rng;
-use crate::reconstruct::inputs::quads;
+use crate::reconstruct::common::inputs::quads;
 use crate::solve::graph::Quad;
 use crate::solve::poisson::{Targets, Weights};
 

@@ -1,10 +1,11 @@
 //! An image at one resolution: colour, differences, features and their variances.
 
 use crate::image::planes::Planes;
-use crate::reconstruct::features::Feature;
-use crate::reconstruct::inputs::{FLOOR, floor_variance};
+use crate::reconstruct::common::features::Feature;
+use crate::reconstruct::common::inputs::{FLOOR, floor_variance};
 
 /// Means and variances of the means, radiance in units of its typical luminance.
+#[derive(Clone)]
 pub struct Level {
     /// Colour, and its variance.
     pub color: Planes,

@@ -15,21 +15,22 @@ mod enhance;
 mod filter;
 mod form;
 mod level;
+mod method;
 mod outliers;
 mod pyramid;
 mod resample;
 
 use std::borrow::Cow;
 
-use self::denoise::{Denoiser, denoise};
 use self::enhance::{Enhanced, enhance};
 use self::filter::{FilterProblem, Solver, Term};
 use self::form::Form;
 use self::level::Level;
+pub use self::method::{METHOD, NearOidn};
 use self::resample::Resampling;
-use super::features::{Feature, Kind};
-use super::inputs::Inputs;
-use super::{Context, EdgeTrust, Method, Note, Parameter, Parameters, Reconstruction, Solution, Traits};
+use super::common::features::{Feature, Kind};
+use super::common::inputs::Inputs;
+use super::{Context, Note, Reconstruction, Solution};
 use crate::error::{Error, Result};
 use crate::film::{EdgeNeed, Frame, Needs, Recorded};
 use crate::image::Image;
@@ -37,36 +38,9 @@ use crate::image::nl_means::rdfc::Denoised;
 use crate::image::planes::Planes;
 use crate::solve::poisson;
 
-const fn parameter(name: &'static str, default: &'static str, summary: &'static str) -> Parameter {
-    Parameter { name, default, summary }
-}
-
-/// `frgr`.
-pub const METHOD: Method = Method {
-    id: "frgr",
-    summary: "colours filtered by weights that gradients and features guide, on several scales; consistent",
-    traits: Traits { edges: EdgeTrust::ByVariance, ..Traits::FILTER },
-    parameters: &[
-        parameter("levels", "2", "resolutions that are worked on, 1 to 8, each half of the one before"),
-        parameter("radius", "4", "radius of the gradient-guided filter's window, 1 to 10 pixels"),
-        parameter("form", "best", "`paper`: as published; `code`: as its authors' program; `best`: as measures best"),
-        parameter("solver", "sweeps", "of the filter's weights: `sweeps`, stopped early, or `exact`, slower"),
-        parameter("resample", "glu", "between resolutions: `glu`, guided linear upsampling, or `bilinear`"),
-        parameter("albedo", "on", "whether the albedo guides, `on` or `off`; left out when the layer is missing"),
-        parameter("normal", "on", "whether the normal guides, `on` or `off`; left out when the layer is missing"),
-        parameter("denoised", "on", "whether the filter is held near the denoised image, `on` or `off`"),
-        parameter(
-            "denoiser",
-            "rdfc",
-            "of that image: `rdfc`, non-local means, `net`, or `oidn`, Open Image Denoise, if installed",
-        ),
-        parameter("enhance", "on", "whether gradients are weighted by their worth, `on` or `off`"),
-        parameter("filter", "on", "whether colours are filtered, `on`, or the enhanced image is the result, `off`"),
-    ],
-    make,
-};
-
-struct Frgr {
+/// The reconstruction with its parameters: by itself near non-local means, or near any other image by [`Frgr::near`].
+#[derive(Clone)]
+pub struct Frgr {
     levels: usize,
     radius: usize,
     form: Form,
@@ -74,34 +48,25 @@ struct Frgr {
     guided: bool,
     features: Vec<Kind>,
     denoised: bool,
-    denoiser: Denoiser,
     enhance: bool,
     filtered: bool,
 }
 
-fn make(parameters: &Parameters) -> Result<Box<dyn Reconstruction>> {
-    let resample = parameters.choice("resample", &["glu", "bilinear"])?;
-    let mut features = Vec::new();
-    for (name, kind) in [("albedo", Kind::Albedo), ("normal", Kind::Normal)] {
-        if parameters.switch(name)? {
-            features.push(kind);
+impl Default for Frgr {
+    /// The parameters of `frgr`.
+    fn default() -> Self {
+        Self {
+            levels: 2,
+            radius: 4,
+            form: Form::Best,
+            solver: Solver::Sweeps,
+            guided: true,
+            features: vec![Kind::Albedo, Kind::Normal],
+            denoised: true,
+            enhance: true,
+            filtered: true,
         }
     }
-    let levels = parameters.get("levels", "a number from 1 to 8", |levels| (1..=8).contains(levels))?;
-    let filtered = parameters.switch("filter")?;
-    Ok(Box::new(Frgr {
-        // Coarser levels guide the filter only.
-        levels: if filtered { levels } else { 1 },
-        radius: parameters.get("radius", "a number from 1 to 10", |radius| (1..=10).contains(radius))?,
-        form: parameters.get("form", "paper, code or best", |_| true)?,
-        solver: parameters.get("solver", "sweeps or exact", |_| true)?,
-        guided: resample == "glu",
-        features,
-        denoised: parameters.switch("denoised")?,
-        denoiser: parameters.choice("denoiser", &["rdfc", "oidn", "net"])?.parse()?,
-        enhance: parameters.switch("enhance")?,
-        filtered,
-    }))
 }
 
 /// Floats held for every pixel besides the frame while levels are worked on, of the finest level while another method denoises
@@ -113,17 +78,33 @@ const BAND_FLOATS: u64 = 45;
 /// A band that is worked on has at least so many rows.
 const LEAST_ROWS: u64 = 32;
 
-/// A level and its denoised image.
-struct Prepared {
+/// A frame as [`Frgr`] works on it: outliers removed, features cleaned, variances raised to those around. Made once, for any number of
+/// images that it is filtered near.
+pub struct Base<'a> {
+    inputs: Inputs<'a>,
     level: Level,
+}
+
+/// A level and its denoised image.
+struct Prepared<'a> {
+    level: Cow<'a, Level>,
     denoised: Planes,
     error: Planes,
 }
 
+/// A filtered image, with those that it was made of.
+pub struct Outcome {
+    /// The filtered image.
+    pub solution: Solution,
+    /// The image that it is near, in radiance.
+    pub denoised: Image,
+    /// The image of the enhanced differences, in radiance.
+    pub enhanced: Image,
+}
+
 impl Reconstruction for Frgr {
     fn needs(&self) -> Needs {
-        let features = !self.features.is_empty() || self.denoiser != Denoiser::Rdfc;
-        Needs { edges: EdgeNeed::Thinned, ..Needs::NONE }.with_if(Recorded::Features, features)
+        Needs { edges: EdgeNeed::Thinned, ..Needs::NONE }.with_if(Recorded::Features, !self.features.is_empty())
     }
 
     fn estimates_error(&self) -> bool {
@@ -135,24 +116,60 @@ impl Reconstruction for Frgr {
     }
 
     fn reconstruct(&self, frame: &Frame, context: &Context) -> Result<Solution> {
+        Ok(self.run(&self.begin(frame, context)?, context)?.solution)
+    }
+}
+
+/// Bytes that are held besides the frame of a pixel while another method makes the image that the result is near.
+pub const HELD_BYTES: u64 = 4 * HELD_FLOATS;
+
+impl Frgr {
+    /// The reconstruction that ends with the image of the enhanced differences.
+    pub fn unfiltered(self) -> Self {
+        // Coarser levels guide the filter only.
+        Self { levels: 1, filtered: false, ..self }
+    }
+
+    /// Prepares a frame.
+    pub fn begin<'a>(&self, frame: &'a Frame, context: &Context) -> Result<Base<'a>> {
         (context.progress)("clean", 0.0);
         let inputs = Inputs::new(frame, 1 << (self.levels - 1))?;
-        let held = HELD_FLOATS * 4 * (inputs.width * inputs.height) as u64;
-        let rows = rows(&inputs, context.memory, held + self.denoiser.bytes(frame))?;
-        let mut notes = Notes { wanted: context.notes, size: (frame.width, frame.height), notes: Vec::new() };
         let level = self.prepare(&inputs, frame)?;
+        Ok(Base { inputs, level })
+    }
+
+    /// Filters near the image of non-local means.
+    pub fn run(&self, base: &Base, context: &Context) -> Result<Outcome> {
+        let rows = self.rows(base, context, 0)?;
+        (context.progress)("denoise", 0.1);
+        let report = |share: f32| (context.progress)("denoise", 0.1 + 0.35 * share);
+        self.near(base, denoise::by_means(&base.level, self.form, rows, &report), context)
+    }
+
+    /// Filters near an image that another method has made of the frame, in radiance.
+    pub fn near_image(&self, base: &Base, image: &Image, context: &Context) -> Result<Outcome> {
+        self.near(base, denoise::judged(&base.level, &base.inputs, image), context)
+    }
+
+    /// Fails if what is held, and `more` bytes of another method, is not within the bound on memory. Rows that may be denoised at a time.
+    pub fn rows(&self, base: &Base, context: &Context, more: u64) -> Result<usize> {
+        let held = HELD_BYTES * (base.inputs.width * base.inputs.height) as u64;
+        rows(&base.inputs, context.memory, held + more)
+    }
+
+    /// Filters near a denoised image.
+    fn near(&self, base: &Base, denoised: Denoised, context: &Context) -> Result<Outcome> {
+        let Base { inputs, level } = base;
+        let frame = inputs.frame;
+        let mut notes = Notes { wanted: context.notes, size: (frame.width, frame.height), notes: Vec::new() };
         notes.add("dx", &level.gradients[0], inputs.scale);
         notes.add("dy", &level.gradients[1], inputs.scale);
-        (context.progress)("denoise", 0.1);
-        let report = |_: &str, share: f32| (context.progress)("denoise", 0.1 + 0.35 * share);
-        let denoised = context.beside(held, |memory| {
-            let context = Context { progress: &report, memory, notes: false };
-            denoise(self.denoiser, (&level, self.form), (&inputs, frame), rows, &context)
-        })?;
         notes.add("denoised", &denoised.image, inputs.scale);
+        let image_of = |planes: &Planes| planes.to_image(frame.width, frame.height, 1.0 / inputs.scale);
+        let shown = image_of(&denoised.image);
         let Denoised { image, error } = denoised;
         (context.progress)("pyramid", 0.45);
-        let mut levels = vec![Prepared { level, denoised: image, error }];
+        let mut levels = vec![Prepared { level: Cow::Borrowed(level), denoised: image, error }];
         let mut choices = Vec::new();
         for k in 1..self.levels {
             let (coarse, choice) = self.coarser(&levels[k - 1]);
@@ -168,28 +185,25 @@ impl Reconstruction for Frgr {
             let this = levels.pop().expect("as many as are counted");
             let enhanced = self.enhance(&this, inputs.spp);
             notes.add(&format!("level{k}_enhanced"), &enhanced.image, inputs.scale);
-            let solution = |image: &Planes, notes: Notes| Solution {
-                image: image.to_image(frame.width, frame.height, 1.0 / inputs.scale),
-                alpha: None,
-                error: Some(error_image(&this, &enhanced, &inputs, frame)),
-                notes: notes.notes,
+            let outcome = |image: &Planes, notes: Notes| {
+                let error = Some(error_image(&this, &enhanced, inputs, frame));
+                let solution = Solution { image: image_of(image), alpha: None, error, notes: notes.notes };
+                Outcome { solution, denoised: shown.clone(), enhanced: image_of(&enhanced.image) }
             };
             if !self.filtered {
-                return Ok(solution(&enhanced.image, notes));
+                return Ok(outcome(&enhanced.image, notes));
             }
             (context.progress)("filter", 1.0 - 0.5 * left);
             let [image, variance] = self.filter(&this, &enhanced.image, upper.as_ref(), inputs.spp);
             notes.add(&format!("level{k}_filtered"), &image, inputs.scale);
             if k == 0 {
-                return Ok(solution(&image, notes));
+                return Ok(outcome(&image, notes));
             }
             upper = Some([choices[k - 1].up(&image), choices[k - 1].up_variance(&variance.sum())]);
         }
         unreachable!("there is a level 0")
     }
-}
 
-impl Frgr {
     /// The finest level: outliers removed, features cleaned, variances raised to those around.
     fn prepare(&self, inputs: &Inputs, frame: &Frame) -> Result<Level> {
         let [color, variance] = inputs.color()?;
@@ -211,7 +225,7 @@ impl Frgr {
     }
 
     /// The next level, and how to get to it and back.
-    fn coarser(&self, fine: &Prepared) -> (Prepared, Resampling) {
+    fn coarser(&self, fine: &Prepared) -> (Prepared<'static>, Resampling) {
         let Prepared { level, denoised, error } = fine;
         let choice = if self.guided {
             let features = level.features.iter().map(|feature| feature.mean.map(|value| 0.1 * value));
@@ -231,7 +245,8 @@ impl Frgr {
             noise: pyramid::variances(&choice, &level.noise),
             features: features.collect(),
         };
-        let prepared = Prepared { level: coarse, denoised: choice.down(denoised), error: choice.down(error) };
+        let prepared =
+            Prepared { level: Cow::Owned(coarse), denoised: choice.down(denoised), error: choice.down(error) };
         (prepared, choice)
     }
 

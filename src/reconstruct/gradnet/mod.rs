@@ -13,14 +13,15 @@
 
 mod means;
 
-use std::borrow::Cow;
 use std::path::Path;
+use std::sync::{Arc, OnceLock};
 
 use self::means::with_means;
-use super::compressed::{DIFFERENCES, FEATURES, NOISELESS_DIFFERENCES, decompress, given};
-use super::inputs::{Inputs, TRAINED_SAMPLES, check_memory};
-use super::residual::{estimated_error, noise, pulled_back, squared_error, trust, windowed};
-use super::{Context, EdgeTrust, Method, Note, Parameter, Parameters, Reconstruction, Solution, Traits, parse};
+use super::common::compressed::{DIFFERENCES, FEATURES, NOISELESS_DIFFERENCES, decompress, given};
+use super::common::inputs::{Inputs, TRAINED_SAMPLES, check_memory};
+use super::common::residual::{estimated_error, noise, pulled_to, squared_error, windowed};
+use super::l1::L1;
+use super::{Context, EdgeTrust, Method, Note, Parameter, Parameters, Reconstruction, Solution, Traits};
 use crate::error::{Error, Result, SourceLoc};
 use crate::film::{Frame, Needs, Recorded};
 use crate::image::planes::Planes;
@@ -57,24 +58,27 @@ const PRINTED: ([usize; 2], usize) = ([3 + FEATURES, NOISELESS_DIFFERENCES], 3);
 const OWN: ([usize; 2], usize) = ([3 + FEATURES + 2 + 3, DIFFERENCES], 4);
 
 struct Solver {
-    network: GradNet,
+    network: Arc<GradNet>,
     /// The solver whose image the network is given, and mixes with its own.
-    l1: Option<Box<dyn Reconstruction>>,
+    l1: Option<L1>,
     means: bool,
 }
 
 fn make(parameters: &Parameters) -> Result<Box<dyn Reconstruction>> {
     let file = parameters.get("weights", "`own` or a file", |text: &String| !text.is_empty())?;
     let path = Path::new(&file);
-    let bytes = match file.as_str() {
-        "own" => Cow::Borrowed(WEIGHTS),
-        _ => Cow::Owned(std::fs::read(path).map_err(|error| Error::io(path, error))?),
+    let read = |bytes: &[u8]| Weights::parse(bytes).and_then(|weights| GradNet::new(&weights)).map(Arc::new);
+    let network = match file.as_str() {
+        "own" => {
+            static NETWORK: OnceLock<Result<Arc<GradNet>, String>> = OnceLock::new();
+            NETWORK.get_or_init(|| read(WEIGHTS)).clone()
+        }
+        _ => read(&std::fs::read(path).map_err(|error| Error::io(path, error))?),
     };
-    let network = Weights::parse(&bytes).and_then(|weights| GradNet::new(&weights));
     let network = network.map_err(|why| SourceLoc::file(path).invalid(why))?;
     let l1 = match (network.inputs(), network.outputs()) {
         PRINTED => None,
-        OWN => Some(parse("l1")?),
+        OWN => Some(L1::default()),
         shape => {
             let what = format!("has a network of {shape:?} channels instead of {PRINTED:?} or {OWN:?}");
             return Err(SourceLoc::file(path).invalid(what));
@@ -101,8 +105,8 @@ impl Reconstruction for Solver {
         let inputs = Inputs::new(frame, GradNet::MULTIPLE)?;
         let [color, variance] = inputs.color()?;
         let report = |what: &str, done: f32| (context.progress)(what, 0.2 * done);
-        let solve = |l1: &dyn Reconstruction| l1.reconstruct(frame, &Context { progress: &report, ..*context });
-        let solved = self.l1.as_deref().map(solve).transpose()?;
+        let solve = |l1: &L1| l1.reconstruct(frame, &Context { progress: &report, ..*context });
+        let solved = self.l1.as_ref().map(solve).transpose()?;
         let l1 = solved.map(|solved| inputs.mirrored(&solved.image, inputs.scale));
         (context.progress)("network", 0.2);
         let more: Vec<_> = l1.iter().collect();
@@ -126,8 +130,7 @@ impl Reconstruction for Solver {
         let image = match &l1 {
             Some(l1) => {
                 let share = (TRAINED_SAMPLES / inputs.spp).min(1.0);
-                let trust = trust(&around, &squared_error(&color, &noise, &image), inputs.spp);
-                pulled_back(&image, l1, &trust.map(|trust| share * trust))
+                pulled_to(&image, l1, (&color, &noise), inputs.spp, share)
             }
             None => image,
         };

@@ -4,8 +4,8 @@ use crate::error::Result;
 use crate::film::Layer;
 use crate::image::planes::Planes;
 use crate::nn::Tensor;
-use crate::reconstruct::inputs::Inputs;
-use crate::reconstruct::residual::{mean, noise};
+use crate::reconstruct::common::inputs::Inputs;
+use crate::reconstruct::common::residual::{mean, noise};
 
 /// Luminance below which differences count as absolute, in units of the typical luminance.
 pub const DARK: f32 = 0.1;

@@ -13,13 +13,17 @@
 
 mod features;
 
+use std::sync::OnceLock;
+
 use self::features::{DARK, features};
-use super::compressed::{compress, decompress, given};
-use super::inputs::{Inputs, NET_BYTES, check_memory};
-use super::residual::{mean, noise, pulled_back, squared_error, trust, windowed};
-use super::{Context, EdgeTrust, Method, Note, Parameter, Parameters, Reconstruction, Solution, Traits, parse};
+use super::common::compressed::{compress, decompress, given};
+use super::common::inputs::{Inputs, NET_BYTES, check_memory};
+use super::common::residual::{mean, noise, pulled_to};
+use super::frgr::{Base, Frgr, HELD_BYTES, Outcome};
+use super::{Context, EdgeTrust, Method, Note, Parameter, Parameters, Reconstruction, Solution, Traits};
 use crate::error::{Error, Result};
 use crate::film::{Frame, Needs, Recorded};
+use crate::image::Image;
 use crate::image::planes::Planes;
 use crate::nn::{GradNet, Tensor, UNet, Weights};
 
@@ -40,16 +44,13 @@ pub const METHOD: Method = Method {
 const WEIGHTS: &[u8] = include_bytes!("net.safetensors");
 const WITH_DIFFERENCES: &[u8] = include_bytes!("differences.safetensors");
 
-/// Method of the filtered image.
-const FILTERED: &str = "frgr:denoiser=net";
-
 /// Number of samples up to which the filtered image is better, and least share of it that is worth its time. With many samples
 /// frgr's filter blurs what the network has kept.
 const FILTERED_SAMPLES: f32 = 32.0;
 const LEAST_SHARE: f32 = 0.1;
 
-/// Intermediate images of `frgr` that the network mixes with its result.
-const IMAGES: [&str; 2] = ["denoised", "level0_enhanced"];
+/// Number of images that the network mixes: `frgr`'s result, its denoised and its enhanced image, and the sampled colours.
+const IMAGES: usize = 4;
 
 /// Radius of the window of `frgr`'s image whose values bound the result, room beyond them, over its luminance, and number of samples
 /// up to which these bounds stay; with more they close in on `frgr`.
@@ -60,36 +61,66 @@ const FEW: f32 = 32.0;
 /// How often the network halves the image.
 const HALVINGS: usize = 4;
 
-struct Net {
-    frgr: Box<dyn Reconstruction>,
+/// The trained networks, read once per process.
+struct Networks {
     network: UNet,
     with_differences: GradNet,
+}
+
+impl Networks {
+    fn get() -> Result<&'static Self> {
+        static NETWORKS: OnceLock<Result<Networks, String>> = OnceLock::new();
+        let read = || {
+            let network = Weights::parse(WEIGHTS).and_then(|weights| UNet::new(&weights, "", HALVINGS))?;
+            let with_differences = Weights::parse(WITH_DIFFERENCES).and_then(|weights| GradNet::new(&weights))?;
+            Ok(Self { network, with_differences })
+        };
+        NETWORKS.get_or_init(read).as_ref().map_err(|why| Error::backend(METHOD.id, why))
+    }
+}
+
+/// The corrected image of `frgr`, with or without the safety rule.
+pub struct Net {
+    frgr: Frgr,
+    networks: &'static Networks,
     safety: bool,
 }
 
+/// A corrected image.
+pub struct Corrected {
+    /// The image, in radiance.
+    pub image: Image,
+    /// The image of `frgr` that was corrected.
+    pub frgr: Image,
+    /// Expected squared error of each value.
+    pub error: Option<Image>,
+    /// Intermediate images, if they are wanted.
+    pub notes: Vec<Note>,
+}
+
 fn make(parameters: &Parameters) -> Result<Box<dyn Reconstruction>> {
-    let broken = |why| Error::backend(METHOD.id, why);
-    let network = Weights::parse(WEIGHTS).and_then(|weights| UNet::new(&weights, "", HALVINGS)).map_err(broken)?;
-    let with_differences =
-        Weights::parse(WITH_DIFFERENCES).and_then(|weights| GradNet::new(&weights)).map_err(broken)?;
-    let image = parameters.choice("image", &["auto", "network", "safe", "filtered"])?;
-    let net = Net { frgr: parse("frgr")?, network, with_differences, safety: image != "network" };
-    Ok(match image.as_ref() {
-        "filtered" => parse(FILTERED)?,
-        "auto" => Box::new(Auto { safe: net, filtered: parse(FILTERED)? }),
-        _ => Box::new(net),
+    Ok(match parameters.choice("image", &["auto", "network", "safe", "filtered"])?.as_ref() {
+        "filtered" => Box::new(Auto { net: Net::new(true)?, filtered: true }),
+        "auto" => Box::new(Auto { net: Net::new(true)?, filtered: false }),
+        image => Box::new(Net::new(image == "safe")?),
     })
+}
+
+/// `net` as it is by default.
+pub fn by_default() -> Result<impl Reconstruction> {
+    Ok(Auto { net: Net::new(true)?, filtered: false })
 }
 
 /// The filtered image with few samples, the safe one with many, and mixtures between.
 struct Auto {
-    safe: Net,
-    filtered: Box<dyn Reconstruction>,
+    net: Net,
+    /// Whether the filtered image is taken with any number of samples.
+    filtered: bool,
 }
 
 impl Reconstruction for Auto {
     fn needs(&self) -> Needs {
-        self.safe.needs()
+        self.net.needs()
     }
 
     fn estimates_error(&self) -> bool {
@@ -101,21 +132,25 @@ impl Reconstruction for Auto {
     }
 
     fn guide(&self) -> Option<&dyn Reconstruction> {
-        self.safe.guide()
+        self.net.guide().filter(|_| !self.filtered)
     }
 
     fn reconstruct(&self, frame: &Frame, context: &Context) -> Result<Solution> {
         let share = (FILTERED_SAMPLES / Inputs::new(frame, 1)?.spp).powi(2).min(1.0);
-        if share < LEAST_SHARE {
-            return self.safe.reconstruct(frame, context);
+        if share < LEAST_SHARE && !self.filtered {
+            return self.net.reconstruct(frame, context);
         }
-        let mut solution = self.filtered.reconstruct(frame, &Context { notes: true, ..*context })?;
-        if let Some(safe) = solution.notes.iter().find(|note| note.name == "denoised") {
-            let values = solution.image.data.iter_mut().zip(&safe.image.data);
+        let (frgr, pixels) = (&self.net.frgr, (frame.width * frame.height) as u64);
+        let base = frgr.begin(frame, context)?;
+        frgr.rows(&base, context, NET_BYTES * pixels)?;
+        let report = |_: &str, done: f32| (context.progress)("denoise", 0.1 + 0.35 * done);
+        let safe = context.beside(HELD_BYTES * pixels, |memory| {
+            self.net.correct(&base, frame, &Context { progress: &report, memory, notes: false })
+        })?;
+        let Outcome { mut solution, denoised, .. } = frgr.near_image(&base, &safe.image, context)?;
+        if !self.filtered {
+            let values = solution.image.data.iter_mut().zip(&denoised.data);
             values.for_each(|(value, safe)| *value = safe + share * (*value - safe));
-        }
-        if !context.notes {
-            solution.notes.clear();
         }
         Ok(solution)
     }
@@ -135,49 +170,60 @@ impl Reconstruction for Net {
     }
 
     fn guide(&self) -> Option<&dyn Reconstruction> {
-        Some(self.frgr.as_ref())
+        Some(&self.frgr)
     }
 
     fn reconstruct(&self, frame: &Frame, context: &Context) -> Result<Solution> {
+        let Corrected { image, error, notes, .. } = self.image(frame, context)?;
+        Ok(Solution { image, alpha: None, error, notes })
+    }
+}
+
+impl Net {
+    /// The networks, with the safety rule or without.
+    pub fn new(safety: bool) -> Result<Self> {
+        Ok(Self { frgr: Frgr::default(), networks: Networks::get()?, safety })
+    }
+
+    /// The corrected image of a frame.
+    pub fn image(&self, frame: &Frame, context: &Context) -> Result<Corrected> {
+        self.correct(&self.frgr.begin(frame, context)?, frame, context)
+    }
+
+    /// The corrected image of a frame that is prepared.
+    fn correct(&self, base: &Base, frame: &Frame, context: &Context) -> Result<Corrected> {
         check_memory(frame, context, METHOD.id, NET_BYTES)?;
-        let inputs = Inputs::new(frame, self.network.multiple())?;
+        let Networks { network, with_differences } = self.networks;
+        let inputs = Inputs::new(frame, network.multiple())?;
         let report = |what: &str, done: f32| (context.progress)(what, 0.7 * done);
-        let solution =
-            self.frgr.reconstruct(frame, &Context { progress: &report, memory: context.memory, notes: true })?;
+        let Outcome { solution, denoised, enhanced } =
+            self.frgr.run(base, &Context { progress: &report, ..*context })?;
         (context.progress)("network", 0.7);
         let [color, variance] = inputs.color()?;
-        let mut images = vec![inputs.mirrored(&solution.image, inputs.scale)];
-        for name in IMAGES {
-            let missing = || Error::backend(METHOD.id, format!("frgr made no image {name}"));
-            images.push(inputs.mirrored(solution.note(name).ok_or_else(missing)?, inputs.scale));
-        }
-        images.push(color.clone());
+        let made = [&solution.image, &denoised, &enhanced].map(|image| inputs.mirrored(image, inputs.scale));
+        let images: [Planes; IMAGES] =
+            made.into_iter().chain([color.clone()]).collect::<Vec<_>>().try_into().expect("four");
         let claimed = solution.error.as_ref().map(|error| inputs.mirrored(error, inputs.scale * inputs.scale));
         let claimed = claimed.unwrap_or_else(|| variance.clone());
-        let by_images = corrected(&images, &self.network.apply(&features(&inputs, &images, &claimed)?));
+        let by_images = corrected(&images, &network.apply(&features(&inputs, &images, &claimed)?));
         (context.progress)("differences", 0.8);
         let claimed = mean(&claimed).map(|error| error.max(0.0).sqrt());
         let shown: Vec<_> = images.iter().collect();
-        let output = self.with_differences.apply(&given(&inputs, &shown, &[&claimed], Some(&variance))?);
+        let output = with_differences.apply(&given(&inputs, &shown, &[&claimed], Some(&variance))?);
         let both = by_images.zip(&moved(&images[0], &output), |one, other| 0.5 * (one + other));
         let corrected = bounded(&images[0], &both, (FEW / inputs.spp).min(1.0).powi(2));
         (context.progress)("safety", 0.95);
-        let noise = noise(&variance);
         let image = if self.safety {
-            let trust = trust(&windowed(&noise), &squared_error(&color, &noise, &corrected), inputs.spp);
-            pulled_back(&corrected, &images[0], &trust)
+            pulled_to(&corrected, &images[0], (&color, &noise(&variance)), inputs.spp, 1.0)
         } else {
             corrected
         };
         let image = image.to_image(frame.width, frame.height, 1.0 / inputs.scale);
         let mut notes = solution.notes;
-        notes.push(Note { name: "frgr".into(), image: solution.image });
-        Ok(Solution {
-            image,
-            alpha: None,
-            error: solution.error,
-            notes: if context.notes { notes } else { Vec::new() },
-        })
+        if context.notes {
+            notes.push(Note { name: "frgr".into(), image: solution.image.clone() });
+        }
+        Ok(Corrected { image, frgr: solution.image, error: solution.error, notes })
     }
 }
 
@@ -185,7 +231,7 @@ impl Reconstruction for Net {
 fn corrected(images: &[Planes], output: &Tensor) -> Planes {
     let luminance = mean(&images[0]).map(|luminance| luminance.max(0.0) + DARK);
     Planes::from_fn(output.width, output.height, 3, |c, x, y| {
-        let (scores, correction) = output.pixel(x, y).split_at(IMAGES.len() + 1);
+        let (scores, correction) = output.pixel(x, y).split_at(IMAGES);
         let largest = scores.iter().fold(f32::NEG_INFINITY, |largest, score| largest.max(*score));
         let (x, y) = (x as isize, y as isize);
         let (mut sum, mut total) = (0.0, 0.0);

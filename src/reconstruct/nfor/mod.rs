@@ -7,7 +7,7 @@
 mod regression;
 
 use self::regression::regress;
-use super::inputs::{FLOOR, Inputs, check_memory, floor_variance};
+use super::common::inputs::{FLOOR, Inputs, check_memory, floor_variance};
 use super::{Context, Method, Parameter, Parameters, Reconstruction, Solution, Traits};
 use crate::error::Result;
 use crate::film::{Frame, Layer, Needs, Recorded};

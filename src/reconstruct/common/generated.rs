@@ -10,12 +10,12 @@ use rayon::prelude::*;
 use super::edge_means::{self, Missing};
 use super::features::{Feature, Kind};
 use super::inputs::Inputs;
-use super::{Parameter, Parameters};
 use crate::error::Result;
 use crate::film::{BINS, EdgeParts, Edges, Layer, Needs, Recorded, bin_count};
 use crate::image::nl_means::{self, Guide, Guides, rdfc};
 use crate::image::planes::Planes;
 use crate::math::rng;
+use crate::reconstruct::{Parameter, Parameters};
 use crate::solve::graph::Quad;
 use crate::solve::poisson::{Targets, Weights};
 

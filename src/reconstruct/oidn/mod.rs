@@ -1,11 +1,14 @@
 //! Open Image Denoise (Intel, 2018 on), a trained network, for comparison. It needs no gradients.
 
-use super::features::without_features;
+mod library;
+
+use self::library::denoise;
+pub use self::library::{Features, Quality, check};
+use super::common::features::without_features;
 use super::{Context, Method, Parameter, Parameters, Reconstruction, Solution, Traits};
 use crate::error::Result;
 use crate::film::{Frame, Layer, Needs, Recorded};
 use crate::image::Image;
-use crate::image::oidn::{Features, Quality, check, denoise};
 
 /// `oidn`.
 pub const METHOD: Method = Method {

@@ -39,7 +39,7 @@ pub fn windowed(planes: &Planes) -> Planes {
     planes.box_mean(RADIUS)
 }
 
-/// An image's [`squared_error`], but no less than a small share of the noise around: residuals tell no less.
+/// An image's [`squared_error`], bounded below by a small share of the noise around, since residuals cannot resolve less.
 pub fn estimated_error(error: &Planes, noise: &Planes) -> Planes {
     error.zip(noise, |error, noise| error.max(LEAST_ERROR * noise))
 }
@@ -50,6 +50,13 @@ pub fn pulled_back(image: &Planes, safe: &Planes, trust: &Planes) -> Planes {
         let (x, y) = (x as isize, y as isize);
         safe.at(c, x, y) + trust.at(0, x, y) * (image.at(c, x, y) - safe.at(c, x, y))
     })
+}
+
+/// An image, pulled back to a safe one where it differs from the sampled colours by more than their [`noise`] explains, and to a
+/// `share` of the way everywhere.
+pub fn pulled_to(image: &Planes, safe: &Planes, (color, noise): (&Planes, &Planes), spp: f32, share: f32) -> Planes {
+    let trust = trust(&windowed(noise), &squared_error(color, noise, image), spp);
+    pulled_back(image, safe, &trust.map(|trust| share * trust))
 }
 
 /// How far an image can be trusted, from 0 to 1, by its [`squared_error`] beyond the noise around, both means over windows. With more

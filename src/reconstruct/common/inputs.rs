@@ -2,13 +2,13 @@
 
 use rayon::prelude::*;
 
-use super::Context;
 use crate::error::{Error, Result};
 use crate::film::{Edges, Frame, Layer};
 use crate::image::Image;
 use crate::image::nl_means::Guide;
 use crate::image::planes::{Planes, mirror};
 use crate::math::Rgb;
+use crate::reconstruct::Context;
 use crate::solve::graph::Quad;
 
 /// Least variance of a colour, as a share of the mean variance of the pixels around it.

@@ -1,9 +1,9 @@
 //! Images denoised by Open Image Denoise.
 
-use super::Image;
 use crate::error::{Error, Result};
 pub use crate::ffi::oidn::Quality;
 use crate::ffi::oidn::{self, Device};
+use crate::image::Image;
 
 /// State of albedo and normal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

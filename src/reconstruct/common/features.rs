@@ -8,6 +8,7 @@ use crate::image::planes::{PlaneTile, Planes};
 use crate::math::lanes::Lanes;
 
 /// A feature of three channels.
+#[derive(Clone)]
 pub struct Feature {
     /// Kind of the feature.
     pub kind: Kind,
