@@ -16,10 +16,10 @@ fn main() {
         println!("cargo::rerun-if-env-changed={variable}");
     }
     build_embree();
-    bind("ffi/embree.h", "embree.rs");
+    bind("ffi/embree.h", "embree.rs", None);
     if env::var_os("CARGO_FEATURE_OPENIMAGEIO").is_some() {
         build_openimageio();
-        bind("ffi/oiio.h", "oiio.rs");
+        bind("ffi/oiio.h", "oiio.rs", Some("Shim"));
     }
 }
 
@@ -91,16 +91,27 @@ fn build_openimageio() {
     build.cpp(true).std("c++17").file("ffi/oiio.cpp").includes(&library.include_paths);
     // The library's own headers are not ours to lint.
     build.flag_if_supported("-Wno-deprecated-declarations").warnings(false);
-    build.compile("fluxion_oiio");
-    for path in &library.link_paths {
-        println!("cargo::rustc-link-search=native={}", path.display());
+    // A library of its own, which the program holds and loads when the first image is read or written: OpenImageIO comes with hundreds
+    // of others, whose loading would take longer than most commands.
+    let objects = build.compile_intermediates();
+    let shared = PathBuf::from(env::var_os("OUT_DIR").unwrap_or_default()).join("fluxion_oiio.so");
+    let mut link = build.get_compiler().to_command();
+    link.arg("-shared").arg("-o").arg(&shared).args(&objects);
+    link.args(library.link_paths.iter().map(|path| format!("-L{}", path.display())));
+    link.args(["-lOpenImageIO", "-lOpenImageIO_Util", "-Wl,-z,defs", "-Wl,-s"]);
+    match link.status() {
+        Ok(status) if status.success() => {}
+        other => fail(&format!("the shim of OpenImageIO could not be linked: {other:?}")),
     }
-    println!("cargo::rustc-link-lib=dylib=OpenImageIO");
-    println!("cargo::rustc-link-lib=dylib=OpenImageIO_Util");
 }
 
-fn bind(header: &str, output: &str) {
-    let bindings = bindgen::Builder::default()
+/// Binds a header: as functions that are linked, or as those of a library that is loaded, a type of this name.
+fn bind(header: &str, output: &str, loaded: Option<&str>) {
+    let mut builder = bindgen::Builder::default();
+    if let Some(name) = loaded {
+        builder = builder.dynamic_library_name(name).dynamic_link_require_all(true);
+    }
+    let bindings = builder
         .header(header)
         .allowlist_item("(fluxion|Fluxion|FLUXION).*")
         .derive_default(true)

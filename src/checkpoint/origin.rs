@@ -161,6 +161,7 @@ impl Origin {
         let seeds: Vec<_> = self.runs.iter().map(|run| run.seed.to_string()).collect();
         Provenance {
             version: self.version.clone(),
+            epoch: self.epoch.to_string(),
             scene: self.scene.clone(),
             fingerprint: self.fingerprint.clone(),
             seed: seeds.join(" "),

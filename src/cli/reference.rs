@@ -7,7 +7,7 @@ use std::time::Duration;
 use anyhow::{Result, bail};
 use fluxion::error::Error;
 use fluxion::reference::{Reference, SEED, check};
-use fluxion::render::Control;
+use fluxion::render::{Control, EPOCH};
 
 use super::outputs::Claims;
 use super::progress;
@@ -100,6 +100,13 @@ fn same(args: &Args, before: &Reference, size: (usize, usize)) -> Result<(), Err
         let what = format!(
             "has {}x{} pixels, not {}x{}: give it another --size or --output",
             there.0, there.1, size.0, size.1
+        );
+        return Err(Error::mismatch(&args.output, what));
+    }
+    if before.epoch != EPOCH {
+        let what = format!(
+            "is of another epoch of samples, {}: this fluxion's are of {EPOCH}; make another one",
+            before.epoch
         );
         return Err(Error::mismatch(&args.output, what));
     }

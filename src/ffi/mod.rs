@@ -5,6 +5,8 @@ pub mod memory;
 pub mod oidn;
 #[cfg(feature = "openimageio")]
 pub mod oiio;
+#[cfg(feature = "openimageio")]
+mod shim;
 #[macro_use]
 pub mod vectors;
 
@@ -12,6 +14,7 @@ pub mod vectors;
 #[allow(
     unsafe_code,
     dead_code,
+    unsafe_op_in_unsafe_fn,
     missing_docs,
     non_camel_case_types,
     non_upper_case_globals,

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
 use super::raw::oiio as raw;
+use super::shim::{self, shim};
 use crate::error::{Error, Result};
 use crate::pixels::parts::{self, Merged, Part};
 use crate::pixels::{DataWindow, Header, Kind, OpenImage, Pixels, Storage, exr_header};
@@ -40,7 +41,7 @@ impl Deref for ImageFile<'_> {
 impl Drop for ImageFile<'_> {
     fn drop(&mut self) {
         // SAFETY: the handle came from fluxion_image_open and is closed once.
-        unsafe { raw::fluxion_image_close(self.handle) }
+        unsafe { shim().fluxion_image_close(self.handle) }
     }
 }
 
@@ -66,15 +67,16 @@ impl<'a> ImageFile<'a> {
         let bytes = std::fs::metadata(path).map_err(|error| Error::io(path, error))?.len() as usize;
         exr_header::check(path)?;
         let name = path_string(path)?;
+        shim::check()?;
         let mut error = raw::FluxionError::default();
         // SAFETY: all pointers are valid for the call.
-        let handle = unsafe { raw::fluxion_image_open(name.as_ptr(), &mut error) };
+        let handle = unsafe { shim().fluxion_image_open(name.as_ptr(), &mut error) };
         if handle.is_null() {
             return Err(Error::io(path, message(&error)));
         }
         let mut file = Self { header: Header::default(), path, handle, parts: Vec::new() };
         // SAFETY: the handle is open.
-        let count = unsafe { raw::fluxion_image_parts(handle) };
+        let count = unsafe { shim().fluxion_image_parts(handle) };
         let parts = (0..count).map(|index| file.part(index)).collect::<Result<Vec<_>>>()?;
         let merged = parts::merge(&parts);
         let Merged { header, parts: positions } =
@@ -90,7 +92,7 @@ impl<'a> ImageFile<'a> {
         let mut spec = raw::FluxionImageSpec::default();
         let mut error = raw::FluxionError::default();
         // SAFETY: the handle is open, and all pointers are valid for the call.
-        let found = unsafe { raw::fluxion_image_part(self.handle, index, &mut spec, &mut error) };
+        let found = unsafe { shim().fluxion_image_part(self.handle, index, &mut spec, &mut error) };
         if found { Ok(spec) } else { Err(Error::io(self.path, message(&error))) }
     }
 
@@ -107,7 +109,7 @@ impl<'a> ImageFile<'a> {
             [spec.format.as_ptr(), spec.part.as_ptr()].map(|text| unsafe { owned(text) }.unwrap_or_default());
         let channels = (0..spec.channels)
             // SAFETY: the handle is open; the string lives as long.
-            .map(|channel| unsafe { owned(raw::fluxion_image_channel(self.handle, channel)) }.unwrap_or_default())
+            .map(|channel| unsafe { owned(shim().fluxion_image_channel(self.handle, channel)) }.unwrap_or_default())
             .collect();
         let storage = (0..spec.channels).map(|channel| self.storage_of(channel)).collect();
         let header =
@@ -140,7 +142,7 @@ impl<'a> ImageFile<'a> {
     fn storage_of(&self, index: i32) -> Storage {
         use raw::FluxionSampleType as Type;
         // SAFETY: the handle is open, and the index is that of a channel.
-        match unsafe { raw::fluxion_image_channel_type(self.handle, index) } {
+        match unsafe { shim().fluxion_image_channel_type(self.handle, index) } {
             Type::FLUXION_FLOAT => Storage::Float,
             Type::FLUXION_UINT8 => Storage::Unsigned(8),
             Type::FLUXION_UINT16 => Storage::Unsigned(16),
@@ -156,21 +158,21 @@ impl OpenImage for ImageFile<'_> {
         self.parts.iter().find_map(|&(index, _)| {
             self.seek(index).ok()?;
             // SAFETY: the handle is open; the string is copied before the next call.
-            unsafe { owned(raw::fluxion_image_attribute(self.handle, name.as_ptr())) }
+            unsafe { owned(shim().fluxion_image_attribute(self.handle, name.as_ptr())) }
         })
     }
 
     fn floats(&self) -> Result<Vec<f32>> {
         // SAFETY: there is room for width * height * channels floats.
         self.samples_of_parts(|handle, data, error| unsafe {
-            raw::fluxion_image_read_floats(handle, data.as_mut_ptr(), error)
+            shim().fluxion_image_read_floats(handle, data.as_mut_ptr(), error)
         })
     }
 
     fn bytes(&self) -> Result<Vec<u8>> {
         // SAFETY: there is room for width * height * channels bytes.
         self.samples_of_parts(|handle, data, error| unsafe {
-            raw::fluxion_image_read_bytes(handle, data.as_mut_ptr(), error)
+            shim().fluxion_image_read_bytes(handle, data.as_mut_ptr(), error)
         })
     }
 }
@@ -186,7 +188,7 @@ unsafe impl Sync for TextureSystem {}
 impl Drop for TextureSystem {
     fn drop(&mut self) {
         // SAFETY: the system came from fluxion_texture_system_new and is released once, after its textures.
-        unsafe { raw::fluxion_texture_system_release(self.0) }
+        unsafe { shim().fluxion_texture_system_release(self.0) }
     }
 }
 
@@ -213,8 +215,9 @@ unsafe impl Sync for CachedTexture {}
 impl TextureSystem {
     /// A system that keeps at most so many megabytes of tiles in memory.
     pub fn new(megabytes: u32) -> Option<Arc<Self>> {
+        shim::check().ok()?;
         // SAFETY: takes no pointer.
-        let raw = unsafe { raw::fluxion_texture_system_new(i32::try_from(megabytes).unwrap_or(i32::MAX)) };
+        let raw = unsafe { shim().fluxion_texture_system_new(i32::try_from(megabytes).unwrap_or(i32::MAX)) };
         (!raw.is_null()).then(|| Arc::new(Self(raw)))
     }
 }
@@ -226,7 +229,7 @@ impl CachedTexture {
         let name = path_string(path)?;
         let mut error = raw::FluxionError::default();
         // SAFETY: all pointers are valid for the call.
-        let texture = unsafe { raw::fluxion_texture_open(system.0, name.as_ptr(), &mut error) };
+        let texture = unsafe { shim().fluxion_texture_open(system.0, name.as_ptr(), &mut error) };
         if texture.is_null() {
             return Err(Error::io(path, message(&error)));
         }
@@ -238,7 +241,7 @@ impl CachedTexture {
     pub fn texel(&self, x: i32, y: i32, samples: &mut [f32]) {
         let count = samples.len() as i32;
         // SAFETY: the system is alive, the texture is one of its own, and `samples` has room for `count` floats.
-        if !unsafe { raw::fluxion_texture_texel(self.system.0, self.texture, x, y, count, samples.as_mut_ptr()) } {
+        if !unsafe { shim().fluxion_texture_texel(self.system.0, self.texture, x, y, count, samples.as_mut_ptr()) } {
             samples.fill(0.0);
             let mut failed = FAILED.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
             failed.get_or_insert_with(|| (self.path.clone(), 0)).1 += 1;
@@ -249,6 +252,7 @@ impl CachedTexture {
 /// Writes an image in the format of the path's extension.
 pub fn write(path: &Path, pixels: &Pixels, kind: Kind, compression: Option<&str>) -> Result<()> {
     assert_eq!(pixels.data.len(), pixels.width * pixels.height * pixels.channels.len(), "samples and sizes differ");
+    shim::check()?;
     let c_string = |text: &str| CString::new(text).map_err(|_| Error::io(path, "a name holds a NUL byte"));
     let file_name = path_string(path)?;
     let size = |n: usize| i32::try_from(n).map_err(|_| Error::io(path, "the image is too large for any format"));
@@ -273,7 +277,7 @@ pub fn write(path: &Path, pixels: &Pixels, kind: Kind, compression: Option<&str>
     let mut error = raw::FluxionError::default();
     // SAFETY: every pointer outlives the call, and the sizes are those of the buffers behind them.
     let written = unsafe {
-        raw::fluxion_image_write(
+        shim().fluxion_image_write(
             file_name.as_ptr(),
             &spec,
             channels.as_ptr(),

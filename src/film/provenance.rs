@@ -5,6 +5,8 @@
 pub struct Provenance {
     /// Version of Fluxion.
     pub version: String,
+    /// Number of the samples, which changes when any bit of any sample does.
+    pub epoch: String,
     /// Name of the scene file.
     pub scene: String,
     /// Hash of the scene's text, in hexadecimal.
@@ -28,8 +30,9 @@ const PREFIX: &str = "fluxion:";
 
 impl Provenance {
     /// Names of the attributes, in the order of the fields.
-    pub const NAMES: [&'static str; 9] = [
+    pub const NAMES: [&'static str; 10] = [
         "fluxion:version",
+        "fluxion:epoch",
         "fluxion:scene",
         "fluxion:fingerprint",
         "fluxion:seed",
@@ -45,15 +48,10 @@ impl Provenance {
         Self { version: env!("CARGO_PKG_VERSION").into(), ..Self::default() }
     }
 
-    /// The provenance of a render that has ended, with so many samples per pixel and seconds.
-    #[must_use]
-    pub fn after(self, spp: f64, seconds: f64) -> Self {
-        Self { spp: spp.round().to_string(), seconds: format!("{seconds:.3}"), ..self }
-    }
-
-    fn values(&mut self) -> [&mut String; 9] {
+    fn values(&mut self) -> [&mut String; 10] {
         [
             &mut self.version,
+            &mut self.epoch,
             &mut self.scene,
             &mut self.fingerprint,
             &mut self.seed,

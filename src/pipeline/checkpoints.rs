@@ -51,9 +51,9 @@ impl Checkpoints {
     ) -> Result<T> {
         let journal = Mutex::default();
         let start = if self.resume && is_there(&self.file) {
-            let checkpoint = checkpoint::load(&self.file)?;
-            checkpoint.origin.resumes(&origin).map_err(|why| Error::mismatch(&self.file, why))?;
-            checkpoint.resume(&journal)
+            let there = checkpoint::summary(&self.file)?.origin;
+            there.resumes(&origin).map_err(|why| Error::mismatch(&self.file, why))?;
+            checkpoint::load(&self.file)?.resume(&journal)
         } else {
             prepared.start(&journal)
         };

@@ -9,7 +9,7 @@ use crate::film::{Film, Layer, Needs, Provenance};
 use crate::image::Image;
 use crate::image::io::{ImageFile, Kind, OpenImage, Pixels, read, write};
 use crate::math::rng;
-use crate::render::{Budget, Control, RenderSettings, render};
+use crate::render::{Budget, Control, EPOCH, RenderSettings, render};
 use crate::scene::Scene;
 
 pub use self::check::{Verdict, check_folder};
@@ -48,6 +48,8 @@ pub struct Reference {
     pub seconds: f64,
     /// The scene's, in hexadecimal.
     pub fingerprint: String,
+    /// [`EPOCH`] of the samples; 0 of files that do not say.
+    pub epoch: u32,
 }
 
 impl Reference {
@@ -63,6 +65,7 @@ impl Reference {
             added: Vec::new(),
             seconds: 0.0,
             fingerprint: scene.fingerprint_hex(),
+            epoch: EPOCH,
         }
     }
 
@@ -116,6 +119,9 @@ impl Reference {
         if self.fingerprint != other.fingerprint {
             return Err("is of another scene".into());
         }
+        if self.epoch != other.epoch {
+            return Err(format!("is of another epoch of samples: {}, not {}", other.epoch, self.epoch));
+        }
         if let Some(seed) = other.seeds().find(|&seed| self.seeds().any(|own| own == seed)) {
             return Err(format!("has the same samples, those of --seed {seed}"));
         }
@@ -166,6 +172,7 @@ impl Reference {
         let provenance = Provenance {
             method: "primal".into(),
             fingerprint: self.fingerprint.clone(),
+            epoch: self.epoch.to_string(),
             seed: self.seeds().map(|seed| seed.to_string()).collect::<Vec<_>>().join("+"),
             spp: self.spp.to_string(),
             seconds: format!("{:.3}", self.seconds),
@@ -187,7 +194,7 @@ impl Reference {
     /// Reads one that [`Reference::save`] wrote.
     pub fn load(path: &Path) -> Result<Self> {
         let pixels = read(path, &Provenance::NAMES)?;
-        let Provenance { fingerprint, seed, spp, seconds, .. } = Provenance::from_attributes(&pixels.attributes);
+        let Provenance { fingerprint, epoch, seed, spp, seconds, .. } = Provenance::from_attributes(&pixels.attributes);
         let lacks = |name: &str| not_one(path, &format!("its header has no sensible `fluxion:{name}`"));
         let spp = spp.parse::<u32>().ok().filter(|spp| *spp > 0 && spp % 2 == 0);
         let seconds = seconds.parse::<f64>().ok().filter(|s| (0.0..1e9).contains(s));
@@ -219,6 +226,7 @@ impl Reference {
             added: added.unwrap_or_default(),
             seconds: seconds.ok_or_else(|| lacks("seconds"))?,
             fingerprint: fingerprint.ok_or_else(|| lacks("fingerprint"))?,
+            epoch: epoch.parse().unwrap_or(0),
         })
     }
 }

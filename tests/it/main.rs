@@ -13,6 +13,7 @@ mod corrupt;
 mod curves;
 mod dataset;
 mod edges;
+mod epoch;
 mod film;
 mod frgr;
 mod gradient;

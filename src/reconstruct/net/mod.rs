@@ -49,8 +49,8 @@ const WITH_DIFFERENCES: &[u8] = include_bytes!("differences.safetensors");
 const FILTERED_SAMPLES: f32 = 32.0;
 const LEAST_SHARE: f32 = 0.1;
 
-/// Number of images that the network mixes: `frgr`'s result, its denoised and its enhanced image, and the sampled colours.
-const IMAGES: usize = 4;
+/// Number of images that the network mixes: `frgr`'s result, its denoised and its enhanced one. It sees the sampled colours, too.
+const MIXED: usize = 3;
 
 /// Radius of the window of `frgr`'s image whose values bound the result, room beyond them, over its luminance, and number of samples
 /// up to which these bounds stay; with more they close in on `frgr`.
@@ -201,8 +201,7 @@ impl Net {
         (context.progress)("network", 0.7);
         let [color, variance] = inputs.color()?;
         let made = [&solution.image, &denoised, &enhanced].map(|image| inputs.mirrored(image, inputs.scale));
-        let images: [Planes; IMAGES] =
-            made.into_iter().chain([color.clone()]).collect::<Vec<_>>().try_into().expect("four");
+        let images: Vec<Planes> = made.into_iter().chain([color.clone()]).collect();
         let claimed = solution.error.as_ref().map(|error| inputs.mirrored(error, inputs.scale * inputs.scale));
         let claimed = claimed.unwrap_or_else(|| variance.clone());
         let by_images = corrected(&images, &network.apply(&features(&inputs, &images, &claimed)?));
@@ -231,7 +230,7 @@ impl Net {
 fn corrected(images: &[Planes], output: &Tensor) -> Planes {
     let luminance = mean(&images[0]).map(|luminance| luminance.max(0.0) + DARK);
     Planes::from_fn(output.width, output.height, 3, |c, x, y| {
-        let (scores, correction) = output.pixel(x, y).split_at(IMAGES);
+        let (scores, correction) = output.pixel(x, y).split_at(MIXED);
         let largest = scores.iter().fold(f32::NEG_INFINITY, |largest, score| largest.max(*score));
         let (x, y) = (x as isize, y as isize);
         let (mut sum, mut total) = (0.0, 0.0);
