@@ -25,9 +25,9 @@ test: packages
 
 # Format, lints and documentation, as CI checks them.
 check: packages
-	cargo fmt --check
+	cargo fmt --all --check
 	cargo clippy --profile checked --all-targets -- -D warnings
-	cd python && cargo fmt --check && CARGO_TARGET_DIR=../target/python cargo clippy -- -D warnings
+	cargo clippy -p fluxion-python -- -D warnings
 	RUSTDOCFLAGS="-D warnings" cargo doc --no-deps
 
 # Licences and sources of all dependencies. Advisories are not looked at here, since that takes an internet connection:
@@ -35,7 +35,6 @@ check: packages
 licences:
 	@command -v cargo-deny > /dev/null || cargo install cargo-deny --locked
 	cargo deny check licenses bans sources
-	cargo deny --manifest-path python/Cargo.toml --config deny.toml check licenses bans sources
 
 # The Python module with everything it needs in it, tested in an environment of its own.
 wheel: packages

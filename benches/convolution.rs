@@ -6,7 +6,7 @@
 use std::process::Command;
 use std::time::Instant;
 
-use fluxion::nn::{Activation, Convolution, Tensor};
+use fluxion::internals::nn::{Activation, Convolution, Tensor};
 
 const RUNS: usize = 5;
 const SIZE: (usize, usize) = (1280, 720);

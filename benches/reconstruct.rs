@@ -9,8 +9,8 @@ use std::time::Instant;
 
 use fluxion::film::{Frame, exr};
 use fluxion::image::Image;
+use fluxion::internals::synthetic::{Distribution, Noise, noisy, picture};
 use fluxion::reconstruct::{Context, parse, solve};
-use fluxion::synthetic::{Distribution, Noise, noisy, picture};
 
 const RUNS: usize = 5;
 

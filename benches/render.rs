@@ -10,8 +10,8 @@ use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
 use fluxion::film::Needs;
+use fluxion::internals::plan::Plan;
 use fluxion::mitsuba;
-use fluxion::plan::Plan;
 use fluxion::render::{Budget, Control, RenderSettings, render};
 use fluxion::scene::Scene;
 

@@ -5,7 +5,7 @@ use std::path::Path;
 use divan::Bencher;
 use divan::counter::ItemsCount;
 use fluxion::film::TILE;
-use fluxion::math::lanes::{LANES, Lanes, Lanes3, Mask};
+use fluxion::internals::math::lanes::{LANES, Lanes, Lanes3, Mask};
 use fluxion::mitsuba;
 use fluxion::render::{SHIFTS, Shift};
 use fluxion::render::{SampleId, sample};

@@ -26,15 +26,17 @@
 //! # }
 //! ```
 
+#![warn(missing_docs)]
+
 // First, for its macro `vectorized` is used by the others.
 #[macro_use]
-pub mod ffi;
+mod ffi;
+
+mod files;
+mod math;
+mod pixels;
 
 pub mod error;
-pub mod files;
-pub mod math;
-pub mod pixels;
-
 pub mod image;
 
 pub mod scene;
@@ -43,12 +45,12 @@ pub mod mitsuba;
 
 pub mod film;
 pub mod neighbours;
-pub mod plan;
+mod plan;
 pub mod render;
 
-pub mod nn;
+mod nn;
 pub mod reconstruct;
-pub mod solve;
+mod solve;
 
 #[cfg(not(any(feature = "openimageio", feature = "pure-images")))]
 compile_error!("image files need one of the features `openimageio` and `pure-images`");
@@ -64,17 +66,29 @@ pub mod dataset;
 pub mod metrics;
 pub mod reference;
 
-pub mod stress;
-pub mod synthetic;
+mod stress;
+mod synthetic;
 
 pub mod bench;
 pub mod report;
+
+/// Shows modules of the crate under the same names.
+macro_rules! show {
+    ($($name:ident)*) => { $(pub mod $name { pub use crate::$name::*; })* };
+}
+
+/// Modules that are no part of the library's interface, for the program, the tests, the benches and the fuzz targets.
+#[doc(hidden)]
+pub mod internals {
+    show! { ffi files math nn pixels plan solve stress synthetic }
+}
 
 pub use self::error::{Error, Result};
 pub use self::film::{Frame, Layer, exr};
 pub use self::image::Image;
 pub use self::image::io::{Extras, write_color};
 pub use self::mitsuba::load;
+pub use self::pipeline::{Host, Recipe};
 pub use self::reconstruct::{Context, Solution, parse as parse_method, solve};
 pub use self::render::{Budget, Control, RenderSettings, render};
 pub use self::scene::Scene;

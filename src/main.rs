@@ -6,12 +6,12 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use fluxion::error::Error;
-use fluxion::ffi::vectors::Vectors;
+use fluxion::internals::ffi::vectors::Vectors;
 
 use self::cli::terminal;
 
 #[global_allocator]
-static ALLOCATOR: fluxion::ffi::memory::Allocator = fluxion::ffi::memory::Allocator;
+static ALLOCATOR: fluxion::internals::ffi::memory::Allocator = fluxion::internals::ffi::memory::Allocator;
 
 fn main() -> ExitCode {
     let args = cli::Args::parse();

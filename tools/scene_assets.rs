@@ -9,7 +9,7 @@ use std::path::Path;
 
 use fluxion::error::Error;
 use fluxion::image::{Image, io};
-use fluxion::math::{Vec3, rng, srgb_decode, vec3};
+use fluxion::internals::math::{Vec3, rng, srgb_decode, vec3};
 
 type Result = std::result::Result<(), Box<dyn std::error::Error>>;
 

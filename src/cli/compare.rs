@@ -5,8 +5,8 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
 use fluxion::error::Error;
-use fluxion::files;
 use fluxion::image::io::{self, Picture};
+use fluxion::internals::files;
 use fluxion::metrics::{self, METRICS};
 use fluxion::report::{Page, Shown, View, heat};
 

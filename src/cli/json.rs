@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
-use fluxion::files;
 use fluxion::image::io;
+use fluxion::internals::files;
 use serde::Serialize;
 
 use super::terminal::out;

@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
 use fluxion::error::Error;
-use fluxion::files;
 use fluxion::image::io;
+use fluxion::internals::files;
 
 /// Removes the empty files that were claimed and never written, when the work has failed.
 pub struct Claims(Vec<PathBuf>);

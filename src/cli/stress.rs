@@ -9,9 +9,9 @@ use super::outputs::Claims;
 use super::terminal::out;
 use anyhow::{Result, bail};
 use fluxion::error::Error;
-use fluxion::files;
+use fluxion::internals::files;
+use fluxion::internals::stress::{Check, cases};
 use fluxion::report::stress::{Row, page};
-use fluxion::stress::{Check, cases};
 
 /// Options of `stress`.
 #[derive(clap::Args)]

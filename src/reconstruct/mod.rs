@@ -138,6 +138,8 @@ pub struct Traits {
     pub denoises: bool,
     /// The mean of the image is that of the colours, whatever the differences.
     pub keeps_mean: bool,
+    /// Directly seen emitters are added after the reconstruction, and do not take part in it.
+    pub direct_apart: bool,
     /// A firefly stays within 16 pixels, with errors of the size of the noise outside.
     pub robust: bool,
     /// Treatment of differences.
@@ -163,6 +165,7 @@ impl Traits {
         exact: true,
         denoises: true,
         keeps_mean: false,
+        direct_apart: true,
         robust: true,
         edges: EdgeTrust::Unused,
         exposure_tolerance: 1e-3,

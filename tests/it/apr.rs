@@ -3,7 +3,7 @@
 use crate::common::frames::{COLOR, EDGE, HEIGHT, Truth, WIDTH, frame, image};
 use fluxion::film::{BINS, Frame, Layer};
 use fluxion::image::Image;
-use fluxion::math::{Rgb, vec3};
+use fluxion::internals::math::{Rgb, vec3};
 use fluxion::reconstruct::{Context, Solution, parse, solve};
 
 fn run(method: &str, frame: &Frame) -> Solution {

@@ -3,8 +3,8 @@
 
 use std::f32::consts::{PI, TAU};
 
-use fluxion::math::lanes::{LANES, Lanes, Lanes3, Mask};
-use fluxion::math::{Rgb, Vec2, Vec3, rng, vec2, vec3};
+use fluxion::internals::math::lanes::{LANES, Lanes, Lanes3, Mask};
+use fluxion::internals::math::{Rgb, Vec2, Vec3, rng, vec2, vec3};
 use fluxion::scene::bsdf::{Bsdf, Lobe, PLUGINS};
 use fluxion::scene::closure::Scatters;
 use fluxion::scene::packet::{Materials, Surfaces};

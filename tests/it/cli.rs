@@ -173,11 +173,15 @@ fn mistakes_are_told_apart_and_leave_nothing_behind() {
 #[test]
 fn data_errors_are_no_mistakes_on_the_command_line() {
     let folder = tempfile::tempdir().unwrap();
-    let mut frame = fluxion::synthetic::exact(&fluxion::synthetic::picture((9, 7)));
-    fluxion::synthetic::change(&mut frame, fluxion::Layer::Dx, |i, value| if i == 4 { f32::NAN } else { value });
+    let mut frame = fluxion::internals::synthetic::exact(&fluxion::internals::synthetic::picture((9, 7)));
+    fluxion::internals::synthetic::change(
+        &mut frame,
+        fluxion::Layer::Dx,
+        |i, value| if i == 4 { f32::NAN } else { value },
+    );
     fluxion::exr::save(&folder.path().join("nan.exr"), &frame).unwrap();
     for (name, size) in [("small.exr", (9, 7)), ("large.exr", (9, 8))] {
-        let image = fluxion::synthetic::picture(size);
+        let image = fluxion::internals::synthetic::picture(size);
         fluxion::write_color(&folder.path().join(name), &image, &fluxion::Extras::default()).unwrap();
     }
     for (arguments, expected) in [

@@ -3,7 +3,7 @@
 use crate::common::frames::{COLOR, HEIGHT, Truth, WIDTH, image};
 use fluxion::film::{Frame, Layer};
 use fluxion::image::Image;
-use fluxion::math::{Rgb, rng, vec3};
+use fluxion::internals::math::{Rgb, rng, vec3};
 use fluxion::metrics;
 use fluxion::reconstruct::{Context, parse, solve};
 

@@ -1,7 +1,7 @@
 //! Scenes of any size anywhere, and light that meets the same surface again and again.
 
 use fluxion::film::Needs;
-use fluxion::math::Vec3;
+use fluxion::internals::math::Vec3;
 use fluxion::scene::Scene;
 
 use crate::common::{film, scene};

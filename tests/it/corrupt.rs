@@ -9,7 +9,7 @@ use crate::common::{bundled, film};
 use fluxion::checkpoint::{self, Origin, Run};
 use fluxion::film::{Needs, exr};
 use fluxion::image::io;
-use fluxion::math::rng;
+use fluxion::internals::math::rng;
 use fluxion::mitsuba::{self, mesh};
 use fluxion::pipeline::peak_bytes;
 use fluxion::render::{RenderOutcome, Shift};
@@ -132,7 +132,8 @@ fn layers_and_images() {
         fs::write(&path, bytes).unwrap();
         exr::load(&path).is_ok()
     });
-    let image = fluxion::image::Image::from_rgb(40, 30, |x, y| fluxion::math::vec3(x as f32, y as f32, 9.0) / 40.0);
+    let image =
+        fluxion::image::Image::from_rgb(40, 30, |x, y| fluxion::internals::math::vec3(x as f32, y as f32, 9.0) / 40.0);
     for name in ["a.exr", "a.hdr", "a.png", "a.jpg"] {
         let path = folder.path().join(name);
         io::write_color(&path, &image, &io::Extras::default()).unwrap();

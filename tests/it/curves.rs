@@ -3,7 +3,7 @@
 use std::fs;
 
 use fluxion::Result;
-use fluxion::math::{Vec3, vec3};
+use fluxion::internals::math::{Vec3, vec3};
 use fluxion::mitsuba;
 use fluxion::scene::packet::{Rays, Surfaces};
 use fluxion::scene::{Ray, Scene};
@@ -45,7 +45,7 @@ fn check(scene: &Scene, rows: &[Row], what: &str) {
         // Packets meet the same.
         let (mut rays, mut surfaces) = (Rays::NONE, Surfaces::default());
         (0..16).for_each(|lane| rays.set(lane, ray(x, y)));
-        let hit = scene.intersect_packet(&rays, fluxion::math::lanes::Mask::first(16), true, &mut surfaces);
+        let hit = scene.intersect_packet(&rays, fluxion::internals::math::lanes::Mask::first(16), true, &mut surfaces);
         assert!(hit.get(5) && surfaces.p.get(5).distance(surface.p) < 1e-3, "{what} at {x},{y}");
     }
 }

@@ -3,9 +3,9 @@
 use fluxion::error::Error;
 use fluxion::film::{BINS, Edges, Frame, Layer};
 use fluxion::image::Image;
-use fluxion::math::{Rgb, rng};
+use fluxion::internals::math::{Rgb, rng};
+use fluxion::internals::synthetic::{change, exact, picture};
 use fluxion::reconstruct::{Context, parse, solve};
-use fluxion::synthetic::{change, exact, picture};
 
 const SIZE: (usize, usize) = (31, 22);
 

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use fluxion::film::{Frame, Layer, exr};
-use fluxion::math::rng;
+use fluxion::internals::math::rng;
 use fluxion::render::EPOCH;
 use serde::{Deserialize, Serialize};
 

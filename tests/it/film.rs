@@ -3,9 +3,9 @@
 use crate::common::{bundled, film, root, sensor};
 use fluxion::film::{Frame, Layer, Needs, Recorded, exr as layers};
 use fluxion::image::Image;
-use fluxion::math::Rgb;
+use fluxion::internals::math::Rgb;
+use fluxion::internals::plan::Plan;
 use fluxion::mitsuba;
-use fluxion::plan::Plan;
 
 fn on_threads(threads: usize) -> fluxion::film::Film {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();

@@ -2,7 +2,7 @@
 
 use fluxion::film::{Frame, Layer};
 use fluxion::image::Image;
-use fluxion::math::{Rgb, rng, vec3};
+use fluxion::internals::math::{Rgb, rng, vec3};
 use fluxion::metrics;
 use fluxion::reconstruct::{Context, Solution, parse, solve};
 

@@ -4,8 +4,8 @@
 use crate::common::{bundled, check_zero, film, shifted_film};
 use fluxion::film::{EdgeNeed, Frame, Layer, Needs};
 use fluxion::image::Image;
-use fluxion::math::lanes::Lanes3;
-use fluxion::math::{Vec3, rng, vec2, vec3};
+use fluxion::internals::math::lanes::Lanes3;
+use fluxion::internals::math::{Vec3, rng, vec2, vec3};
 use fluxion::render::Shift;
 use fluxion::render::gradient::reconnect::{connection, half_vector};
 

@@ -493,7 +493,7 @@ fn out_of_memory_is_an_error() {
 #[test]
 fn textures_that_vanish_while_rendering_are_reported() {
     let folder = tempfile::tempdir().unwrap();
-    let image = Image::from_rgb(512, 512, |x, y| fluxion::math::vec3(x as f32, y as f32, 1.0) / 512.0);
+    let image = Image::from_rgb(512, 512, |x, y| fluxion::internals::math::vec3(x as f32, y as f32, 1.0) / 512.0);
     let texture = folder.path().join("a.exr");
     fluxion::image::io::write_color(&texture, &image, &Default::default()).unwrap();
     let body = format!(

@@ -4,7 +4,7 @@ use std::f32::consts::PI;
 use std::fs;
 
 use fluxion::film::Needs;
-use fluxion::math::{Frame, Vec3, vec3};
+use fluxion::internals::math::{Frame, Vec3, vec3};
 use fluxion::mitsuba;
 use fluxion::scene::Scene;
 

@@ -2,9 +2,9 @@
 
 use fluxion::film::{Frame, Layer};
 use fluxion::image::Image;
+use fluxion::internals::synthetic::{Distribution, Noise, change, noisy, picture};
 use fluxion::metrics;
 use fluxion::reconstruct::{Context, Solution, parse, solve};
-use fluxion::synthetic::{Distribution, Noise, change, noisy, picture};
 
 fn frame((width, height): (usize, usize), noise: f32, seed: u64) -> Frame {
     noisy(

@@ -5,7 +5,7 @@ use std::f32::consts::{PI, TAU};
 
 use crate::common::{check_zero, film, scene, sensor};
 use fluxion::film::{Layer, Needs};
-use fluxion::math::{Rgb, Vec2, Vec3, rng, vec2, vec3, warp};
+use fluxion::internals::math::{Rgb, Vec2, Vec3, rng, vec2, vec3, warp};
 use fluxion::scene::Scene;
 use fluxion::scene::emitter::{Emitter, PLUGINS, Position};
 

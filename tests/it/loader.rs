@@ -2,7 +2,7 @@
 
 use crate::common::{film, scene, sensor, try_scene};
 use fluxion::film::{Layer, Needs, Recorded};
-use fluxion::math::{vec2, vec3};
+use fluxion::internals::math::{vec2, vec3};
 use fluxion::mitsuba;
 use fluxion::scene::Ray;
 use fluxion::scene::emitter::Position;

@@ -1,7 +1,7 @@
 //! Inference: layers against PyTorch's and against sums written out, on any number of threads and in bands.
 
-use fluxion::nn::tensor::in_bands;
-use fluxion::nn::{Activation, Convolution, Tensor, Weights, resample};
+use fluxion::internals::nn::tensor::in_bands;
+use fluxion::internals::nn::{Activation, Convolution, Tensor, Weights, resample};
 use proptest::prelude::*;
 
 const VECTORS: &[u8] = include_bytes!("../data/nn.safetensors");

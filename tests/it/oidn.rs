@@ -2,10 +2,10 @@
 
 use fluxion::film::{Frame, Layer};
 use fluxion::image::Image;
-use fluxion::math::{Rgb, rng, vec3};
+use fluxion::internals::math::{Rgb, rng, vec3};
+use fluxion::internals::synthetic::{Distribution, Noise, noisy};
 use fluxion::metrics;
 use fluxion::reconstruct::{Context, parse, solve};
-use fluxion::synthetic::{Distribution, Noise, noisy};
 
 fn image(pixel: impl Fn(usize, usize) -> Rgb) -> Image {
     Image::from_rgb(96, 64, pixel)

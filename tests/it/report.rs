@@ -5,7 +5,7 @@ use std::process::Command;
 
 use fluxion::bench::{LeftOut, Record, Results, Seconds};
 use fluxion::image::Image;
-use fluxion::math::vec3;
+use fluxion::internals::math::vec3;
 use fluxion::report::{Page, Shown, View, changes};
 
 fn record(method: &str, budget: u32, seed: u64, error: f64) -> Record {

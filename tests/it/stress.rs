@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 
-use fluxion::stress::{Check, cases};
+use fluxion::internals::stress::{Check, cases};
 
 #[test]
 fn cases_have_names_of_their_own_that_tell_their_kind() {

@@ -144,7 +144,7 @@ fn color(scene: &Scene) -> [f32; 3] {
 
 /// sRGB to linear, of a share of the largest number.
 fn srgb(encoded: f32) -> f32 {
-    fluxion::math::srgb_decode(encoded)
+    fluxion::internals::math::srgb_decode(encoded)
 }
 
 /// A file and its colour: decoded, and with `raw`.
@@ -248,7 +248,7 @@ fn every_format_depth_and_set_of_channels_has_its_colours() {
 #[test]
 fn eight_bits_of_the_display_formats_are_decoded() {
     let folder = tempfile::tempdir().unwrap();
-    let image = fluxion::Image::from_rgb(SIZE.0, SIZE.1, |_, _| fluxion::math::vec3(0.25, 0.5, 0.75));
+    let image = fluxion::Image::from_rgb(SIZE.0, SIZE.1, |_, _| fluxion::internals::math::vec3(0.25, 0.5, 0.75));
     for name in ["a.jpg", "a.png", "a.hdr", "a.exr"] {
         let path = folder.path().join(name);
         fluxion::write_color(&path, &image, &fluxion::Extras::default()).unwrap();

@@ -12,7 +12,7 @@ use anyhow::{Result, bail};
 use clap::ArgGroup;
 use fluxion::adaptive::Start;
 use fluxion::error::Error;
-use fluxion::ffi::memory::say_what_is_kept;
+use fluxion::internals::ffi::memory::say_what_is_kept;
 use fluxion::mitsuba;
 use fluxion::pipeline::{Host, Prepared, RENDERING, Recipe, Rendered, Stats};
 use fluxion::render::{self, FilmSink, SampleId};

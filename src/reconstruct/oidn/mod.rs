@@ -14,7 +14,7 @@ use crate::image::Image;
 pub const METHOD: Method = Method {
     id: "oidn",
     summary: "Open Image Denoise, a trained network, with albedo and normal; path tracing only; it has to be installed",
-    traits: Traits { exact: false, ..Traits::FILTER },
+    traits: Traits { exact: false, direct_apart: false, ..Traits::FILTER },
     parameters: &[
         Parameter {
             name: "prefilter",

@@ -2,8 +2,8 @@
 
 use fluxion::film::{Frame, Layer};
 use fluxion::image::Image;
-use fluxion::math::{Rgb, vec3};
-use fluxion::synthetic::{Distribution, Noise, noisy};
+use fluxion::internals::math::{Rgb, vec3};
+use fluxion::internals::synthetic::{Distribution, Noise, noisy};
 
 pub const WIDTH: usize = 80;
 pub const HEIGHT: usize = 60;
