@@ -47,7 +47,7 @@ impl Job {
             let (scenes, recipe, checkpoint_every) = (&scenes[..], &recipe, Checkpoints::EVERY);
             let job =
                 job::Job::new(&Settings { folder, scenes, frames, spp, chunks, adaptive, recipe, checkpoint_every })?;
-            job.create()?;
+            job.create(&[])?;
             Ok(job)
         })?;
         Ok(Self(job))

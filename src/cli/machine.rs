@@ -3,6 +3,7 @@
 use std::sync::OnceLock;
 
 use anyhow::Result;
+use clap::ValueEnum;
 
 /// Options of the machine.
 #[derive(Clone, Copy, Debug, Default, clap::Args)]
@@ -47,6 +48,21 @@ fn parse_threads(text: &str) -> Result<usize, String> {
 }
 
 impl Args {
+    /// The options that are given, as words of a command line.
+    pub fn words(self) -> Vec<String> {
+        let mut words = Vec::new();
+        if self.threads > 0 {
+            words.extend(["--threads".to_owned(), self.threads.to_string()]);
+        }
+        if self.quiet {
+            words.push("--quiet".to_owned());
+        }
+        if let Some(style) = self.progress.to_possible_value().filter(|_| self.progress != Style::Auto) {
+            words.extend(["--progress".to_owned(), style.get_name().to_owned()]);
+        }
+        words
+    }
+
     /// Makes all work of this process follow the options.
     pub fn apply(self) -> Result<()> {
         let _ = CHOSEN.set(self);

@@ -183,8 +183,9 @@ impl Job {
         Ok(job)
     }
 
-    /// Makes the folder, with the plan and what hands its chunks to schedulers. The error says that the folder has a job already.
-    pub fn create(&self) -> Result<()> {
+    /// Makes the folder, with the plan and what hands its chunks to schedulers, with `options` of `fluxion job run`. The error says that the
+    /// folder has a job already.
+    pub fn create(&self, options: &[String]) -> Result<()> {
         let folder = &self.folder;
         if folder.join(FILE).exists() {
             let what = format!("{} has a job already: take another folder", folder.display());
@@ -193,7 +194,7 @@ impl Job {
         let failed = |error| Error::io(folder, format!("cannot be made: {error}"));
         std::fs::create_dir_all(folder).map_err(failed)?;
         let absolute = folder.canonicalize().map_err(|error| Error::io(folder, error))?;
-        schedulers::write(folder, &absolute, &self.rounds())?;
+        schedulers::write(folder, &absolute, &self.rounds(), options)?;
         let text = serde_json::to_string_pretty(self).map_err(|error| Error::backend("json", error))?;
         files::write(&folder.join(FILE), text + "\n")
     }

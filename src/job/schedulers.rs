@@ -12,20 +12,23 @@ use crate::files;
 /// Seconds from the request to stop to the kill: enough for running tiles and a checkpoint.
 const GRACE: u32 = 120;
 
-/// Writes all of them into the folder of a job, whose absolute path is `job`, with the numbers of the chunks of one round or of two.
-pub fn write(folder: &Path, job: &Path, rounds: &[Range<usize>; 2]) -> Result<()> {
+/// Writes all of them into the folder of a job, whose absolute path is `job`, with the numbers of the chunks of one round or of two, and
+/// with options of the commands that run them.
+pub fn write(folder: &Path, job: &Path, rounds: &[Range<usize>; 2], options: &[String]) -> Result<()> {
+    let run: String =
+        std::iter::once("fluxion job run").chain(options.iter().map(String::as_str)).collect::<Vec<_>>().join(" ");
     let quoted = format!("'{}'", job.display().to_string().replace('\'', r"'\''"));
     for (round, name) in rounds.iter().zip(["commands.txt", "commands-2.txt"]).filter(|(round, _)| !round.is_empty()) {
-        let command = |number| format!("fluxion job run {quoted} {number}\n");
+        let command = |number| format!("{run} {quoted} {number}\n");
         files::write(&folder.join(name), round.clone().map(command).collect::<String>())?;
     }
-    files::write(&folder.join("slurm.sh"), slurm(&quoted, rounds))?;
-    files::write(&folder.join("openjd.yaml"), openjd(job, rounds)?)
+    files::write(&folder.join("slurm.sh"), slurm(&quoted, &run, rounds))?;
+    files::write(&folder.join("openjd.yaml"), openjd(job, rounds, options)?)
 }
 
 /// Submits an array of all chunks that are not complete, and a merge when it has ended. A chunk that was stopped is queued again. Of two
 /// rounds the second waits until its samples have been allocated.
-fn slurm(job: &str, rounds: &[Range<usize>; 2]) -> String {
+fn slurm(job: &str, run: &str, rounds: &[Range<usize>; 2]) -> String {
     let chunks = rounds[1].end;
     let second = if rounds[1].is_empty() { String::new() } else { second_round(&rounds[1]) };
     format!(
@@ -42,7 +45,7 @@ chunks() {{
 	sbatch --parsable --job-name=fluxion --array="$numbers" --requeue --signal=TERM@{GRACE} --open-mode=append \
 		--output="$job/slurm-%a.log" "$@" <<'EOF'
 #!/bin/sh
-srun fluxion job run {job} "$SLURM_ARRAY_TASK_ID"
+srun {run} {job} "$SLURM_ARRAY_TASK_ID"
 code=$?
 # Stopped, with all samples saved.
 if [ $code = 75 ]; then
@@ -101,7 +104,7 @@ fn range(numbers: &Range<usize>) -> String {
 }
 
 /// A template with a task for every chunk, and a step that merges them; of two rounds with one that allocates the second.
-fn openjd(job: &Path, rounds: &[Range<usize>; 2]) -> Result<String> {
+fn openjd(job: &Path, rounds: &[Range<usize>; 2], options: &[String]) -> Result<String> {
     let script = |words: &[&str], chunk: Option<&str>| {
         let job = job.display().to_string();
         let args: Vec<_> = words.iter().copied().chain([job.as_str()]).chain(chunk).collect();
@@ -110,7 +113,8 @@ fn openjd(job: &Path, rounds: &[Range<usize>; 2]) -> Result<String> {
     };
     let render = |name: &str, round: &Range<usize>| {
         let parameters = json!({"taskParameterDefinitions": [{"name": "Chunk", "type": "INT", "range": range(round)}]});
-        let run = script(&["job", "run"], Some("{{Task.Param.Chunk}}"));
+        let words: Vec<_> = ["job", "run"].into_iter().chain(options.iter().map(String::as_str)).collect();
+        let run = script(&words, Some("{{Task.Param.Chunk}}"));
         json!({"name": name, "parameterSpace": parameters, "script": run})
     };
     let mut steps = vec![render("Render", &rounds[0])];

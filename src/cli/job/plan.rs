@@ -51,17 +51,25 @@ fn parse_frames(text: &str) -> Result<(u32, u32), String> {
     if frames.0 <= frames.1 && frames.1 < u32::MAX { Ok(frames) } else { Err(wrong()) }
 }
 
-/// The recipe that the options of `fluxion render` behind the -- say, and the time between checkpoints.
-fn recipe(args: &Args) -> Result<(Recipe, Duration)> {
+/// The options of `fluxion render` behind the --.
+struct Chunks {
+    recipe: Recipe,
+    checkpoint_every: Duration,
+    /// Options of the machine, which go to the commands of the chunks.
+    machine: Vec<String>,
+}
+
+fn chunks(args: &Args) -> Result<Chunks> {
     // The job says of these, so they cannot be said again.
     let said =
         ["fluxion", "render", "scene.xml", "--spp", "1", "--first", "0", "--seed", "0", "--checkpoint", "c.ckpt"];
     let line = said.into_iter().chain(args.options.iter().map(String::as_str));
     match CliArgs::try_parse_from(line) {
-        Ok(CliArgs { command: Command::Render(render), .. }) => {
+        Ok(CliArgs { command: Command::Render(render), machine }) => {
             let recipe = Recipe { seed: args.seed, ..render.recipe() };
             let limits = Limits { spp: None, ..recipe.limits };
-            Ok((Recipe { limits, ..recipe }, render.checkpoint_every()))
+            let (checkpoint_every, machine) = (render.checkpoint_every(), machine.words());
+            Ok(Chunks { recipe: Recipe { limits, ..recipe }, checkpoint_every, machine })
         }
         Ok(_) => bail!(Error::Usage("options of the chunks are those of `fluxion render`".into())),
         Err(error) => bail!(Error::Usage(format!("options of the chunks: {error}"))),
@@ -70,13 +78,13 @@ fn recipe(args: &Args) -> Result<(Recipe, Duration)> {
 
 /// Writes the plan, and what hands its chunks to schedulers.
 pub fn run(args: &Args) -> Result<ExitCode> {
-    let (recipe, checkpoint_every) = recipe(args)?;
+    let Chunks { recipe, checkpoint_every, machine } = chunks(args)?;
     let (folder, adaptive): (&Path, _) = (&args.output, args.adaptive.as_deref());
     let Args { scenes, frames, spp, chunks, .. } = args;
     let (frames, spp, chunks) = (*frames, *spp, *chunks);
     let settings = Settings { folder, scenes, frames, spp, chunks, adaptive, recipe: &recipe, checkpoint_every };
     let job = Job::new(&settings)?;
-    job.create()?;
+    job.create(&machine)?;
     let second = if job.adaptive.is_some() { ", after `fluxion job allocate` each of commands-2.txt" } else { "" };
     out!("{}: {} chunks; each line of commands.txt renders one{second}", folder.display(), job.chunks())?;
     Ok(ExitCode::SUCCESS)
