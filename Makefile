@@ -6,7 +6,7 @@ PACKAGES = g++ pkg-config libclang-dev libembree-dev libopenimageio-dev
 TEST_PACKAGES = chromium
 SCENE = scenes/cornell-box/scene.xml
 
-.PHONY: demo test packages check licences wheel memcheck train-net train-blend train-gradnet train-kernels
+.PHONY: demo test packages check licences wheel deb dist memcheck train-net train-blend train-gradnet train-kernels
 
 demo: packages
 	cargo build --release
@@ -42,6 +42,17 @@ wheel: packages
 	cargo build --release
 	python/build target/wheels
 	python/check target/wheels target/release/fluxion
+
+# A package for this release of Debian, in target/debian.
+deb: packages
+	@command -v cargo-deb > /dev/null || cargo install cargo-deb --locked
+	cargo build --release
+	tools/package/extras target/release/fluxion target/package
+	cargo deb --no-build
+
+# A tarball for people without cargo, with Embree and TBB in it, in target/dist.
+dist: packages
+	tools/package/dist target/dist
 
 # Small renders under valgrind.
 memcheck: packages

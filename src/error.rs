@@ -138,6 +138,12 @@ impl Error {
         }
     }
 
+    /// A name that is none of those that a table has: a method, an allocator, a metric.
+    pub fn unknown<'a>(what: &str, name: &str, known: impl IntoIterator<Item = &'a str>) -> Self {
+        let known: Vec<_> = known.into_iter().collect();
+        Self::Usage(format!("{what} `{name}` is not known; there are {}", known.join(", ")))
+    }
+
     /// The failure of an operation on the file `path`.
     pub fn io(path: &Path, what: impl fmt::Display) -> Self {
         Self::Io { path: path.to_path_buf(), what: what.to_string() }

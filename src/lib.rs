@@ -9,18 +9,20 @@
 //! A **sample** is the result of one camera path; sample i of a pixel belongs to **bin** i mod 8. An **edge** is the
 //! difference between two pixels, estimated from both of its ends by **shifting** paths. The **film** accumulates
 //! statistics of all samples; developed, it is a **frame** of **layers**: images with names and variances. A **method**
-//! reconstructs an image from a frame, and the **plan** says what need not be computed for it. docs/glossary.md has all
-//! terms.
+//! reconstructs an image from a frame, and the **plan** says what need not be computed for it. A **recipe** is everything that
+//! decides a render; [`pipeline`] carries it out. docs/glossary.md has all terms.
 //!
 //! ```
-//! use fluxion::{Budget, Context, Control, RenderSettings, load, parse_method, render, solve};
+//! use fluxion::{Host, Recipe};
 //!
 //! # fn main() -> fluxion::Result<()> {
-//! let scene = load("scenes/unit/diffuse/scene.xml".as_ref(), &Default::default())?;
-//! let method = parse_method("frgr")?;
-//! let settings = RenderSettings::new(Budget::Spp(4), method.needs());
-//! let frame = render(&scene, settings, &Control::QUIET).film.develop();
-//! let image = solve(method.as_ref(), &frame, &Context::QUIET)?.image;
+//! let file = "scenes/unit/diffuse/scene.xml".as_ref();
+//! let mut recipe = Recipe::of_method("frgr");
+//! recipe.limits.spp = Some(4);
+//! recipe.outputs.image = true;
+//! let scene = recipe.load(file)?;
+//! let rendered = recipe.prepare(&scene, file)?.run_anew(&Host::QUIET)?;
+//! let image = rendered.solution.expect("it was asked for").image;
 //! assert_eq!((image.width, image.height), (scene.sensor().width, scene.sensor().height));
 //! # Ok(())
 //! # }
@@ -35,6 +37,7 @@ mod ffi;
 mod files;
 mod math;
 mod pixels;
+mod sync;
 
 pub mod error;
 pub mod image;
@@ -80,7 +83,7 @@ macro_rules! show {
 /// Modules that are no part of the library's interface, for the program, the tests, the benches and the fuzz targets.
 #[doc(hidden)]
 pub mod internals {
-    show! { ffi files math nn pixels plan solve stress synthetic }
+    show! { ffi files math nn pixels plan solve stress sync synthetic }
 }
 
 pub use self::error::{Error, Result};

@@ -23,21 +23,24 @@ impl Job {
     /// frames of every scene, which is read with the parameter `frame`; with `adaptive` an allocator allocates three quarters of the samples in a
     /// second round. Further keywords are those of `load_file` and of `render`.
     #[staticmethod]
-    #[pyo3(signature = (scenes, folder, *, spp, chunks=1, frames=None, adaptive=None, **keywords))]
+    #[pyo3(signature = (scenes, folder, *, chunks=1, frames=None, adaptive=None, **keywords))]
+    #[pyo3(text_signature = "(scenes, folder, *, spp, chunks=1, frames=None, adaptive=None, **keywords)")]
     fn plan(
         py: Python<'_>,
         scenes: Vec<PathBuf>,
         folder: PathBuf,
-        spp: u32,
         chunks: u32,
         frames: Option<(u32, u32)>,
         adaptive: Option<String>,
         keywords: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
-        if spp == 0 || chunks == 0 || frames.is_some_and(|(first, last)| first > last || last == u32::MAX) {
-            return Err(PyValueError::new_err("spp and chunks are numbers from 1 on, frames a first and a last one"));
-        }
         let (Keywords { mut recipe, size, threads, .. }, left) = Keywords::read(keywords)?;
+        let Some(spp) = recipe.limits.spp.take() else {
+            return Err(PyValueError::new_err("a job takes spp: samples per pixel"));
+        };
+        if chunks == 0 || frames.is_some_and(|(first, last)| first > last || last == u32::MAX) {
+            return Err(PyValueError::new_err("chunks are a number from 1 on, frames a first and a last one"));
+        }
         let others = PyDict::new(py);
         left.into_iter().try_for_each(|(name, value)| others.set_item(name, value))?;
         recipe.scene = options(Some(&others))?;

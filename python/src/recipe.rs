@@ -33,9 +33,12 @@ fn duration(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Duration> {
     }
 }
 
+/// Keywords that are none of a recipe's.
+pub type Others<'py> = Vec<(String, Bound<'py, PyAny>)>;
+
 impl Keywords {
     /// Reads the keywords that belong to a recipe; the others are left, by their names, in the order that they were given.
-    pub fn read<'py>(keywords: Option<&Bound<'py, PyDict>>) -> PyResult<(Self, Vec<(String, Bound<'py, PyAny>)>)> {
+    pub fn read<'py>(keywords: Option<&Bound<'py, PyDict>>) -> PyResult<(Self, Others<'py>)> {
         let mut read = Self { recipe: Recipe::default(), size: None, threads: 0, checkpoints: None };
         let (mut checkpoint, mut every, mut resume) = (None::<PathBuf>, Checkpoints::EVERY, false);
         let mut left = Vec::new();

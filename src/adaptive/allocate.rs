@@ -14,7 +14,7 @@ const RADIUS: usize = 3;
 const DARK: f64 = 0.2;
 
 /// Share of the samples that are spread evenly, so that no pixel is starved by a bad estimate: methods darken what has few
-/// samples, and their estimates do not tell all of it. A quarter gains as much where estimates are good, and loses where not.
+/// samples, and their estimates do not show all of it. A quarter gains as much where estimates are good, and loses where not.
 const MINIMUM: f64 = 0.5;
 
 /// Largest number of samples that a pixel gets, over that of even samples.

@@ -52,10 +52,8 @@ pub const ALLOCATORS: &[&dyn Allocator] = &[&predicted_error::PredictedError, &v
 
 /// The allocator of a name.
 pub fn allocator(id: &str) -> Result<&'static dyn Allocator> {
-    ALLOCATORS.iter().copied().find(|allocator| allocator.id() == id).ok_or_else(|| {
-        let names: Vec<_> = ALLOCATORS.iter().map(|allocator| allocator.id()).collect();
-        Error::Usage(format!("allocator `{id}` is not known; there are {}", names.join(", ")))
-    })
+    let unknown = || Error::unknown("allocator", id, ALLOCATORS.iter().map(|allocator| allocator.id()));
+    ALLOCATORS.iter().copied().find(|allocator| allocator.id() == id).ok_or_else(unknown)
 }
 
 /// The allocator of a name, or without one the default where there is time or an error to decide by and the method allows it.

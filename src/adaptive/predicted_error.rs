@@ -37,7 +37,7 @@ impl Allocator for PredictedError {
 }
 
 /// Squared differences of means over windows from those of the samples, beyond their noise. Methods that trust what varies little
-/// darken images of few samples, pixel by pixel by less than the noise; their own estimates do not tell.
+/// darken images of few samples, pixel by pixel by less than the noise; their own estimates do not show it.
 fn squared_bias(frame: &Frame, image: &Image) -> Result<Image> {
     let (color, variance) = (frame.require(Layer::Color)?, frame.require(Layer::ColorVariance)?);
     let direct = frame.get(Layer::Direct);

@@ -12,6 +12,7 @@ use crate::film::Frame;
 use crate::reconstruct::{self, Context, Reconstruction, Solution};
 use crate::render::{Control, RenderOutcome, RenderSettings, render_to_counts};
 use crate::scene::Scene;
+use crate::sync::lock;
 
 /// Everything that decides an adaptive run.
 pub struct AdaptiveSettings<'a> {
@@ -150,7 +151,7 @@ impl Run<'_> {
     }
 
     fn journal(&self) -> MutexGuard<'_, Journal> {
-        self.journal.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
+        lock(self.journal)
     }
 
     /// Seconds that the method takes, if they are known.

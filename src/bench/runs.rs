@@ -19,7 +19,7 @@ pub struct Runs<'a> {
 }
 
 impl Runs<'_> {
-    /// Runs what the store does not have yet, until `stop` is set. `report` is told what comes next. A run that fails is
+    /// Runs what the store does not have yet, until `stop` is set. `report` is called with the next run. A run that fails is
     /// noted among those left out, and the others go on.
     pub fn on(&self, case: &Case, store: &mut Store, stop: &AtomicBool, report: &mut dyn FnMut(&str)) -> Result<()> {
         let candidate = |method| Ok(Candidate { runner: Runner::new(case, method)?, times: None });

@@ -15,6 +15,7 @@ use crate::adaptive::{self, Journal};
 use crate::error::Result;
 use crate::film::{Frame, Rejected};
 use crate::render::{RenderOutcome, SampleId};
+use crate::sync::lock;
 use std::path::Path;
 
 /// A film and where it comes from.
@@ -54,7 +55,7 @@ pub fn verify(path: &Path) -> Result<()> {
 impl Checkpoint {
     /// The render so far, to be resumed.
     pub fn resume(self, journal: &Mutex<Journal>) -> adaptive::Start<'_> {
-        *journal.lock().unwrap_or_else(|poisoned| poisoned.into_inner()) = self.journal.unwrap_or_default();
+        *lock(journal) = self.journal.unwrap_or_default();
         adaptive::Start { render: self.outcome, journal }
     }
 

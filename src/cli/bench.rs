@@ -175,7 +175,7 @@ fn reference(args: &Args) -> Option<&Path> {
 fn check(case: &Case, budgets: &[Budget]) -> Result<()> {
     if case.truth.floor.is_none() {
         note!(
-            "warning: the reference of {0} does not say how noisy it is, nor does a file {0}_var.exr beside it",
+            "warning: the reference of {0} has no noise estimate, and there is no file {0}_var.exr next to it",
             case.name
         );
     }

@@ -38,10 +38,8 @@ pub const ALPHA: (&str, &str) = ("alpha", "mean of |I - R| of the alpha channels
 
 /// Measures with every metric.
 pub fn run(args: &Args) -> Result<ExitCode> {
-    let metric = metrics::find(&args.metric).ok_or_else(|| {
-        let names: Vec<_> = METRICS.iter().map(|metric| metric.id).collect();
-        Error::Usage(format!("metric `{}` is not known; there are {}", args.metric, names.join(", ")))
-    })?;
+    let unknown = || Error::unknown("metric", &args.metric, METRICS.iter().map(|metric| metric.id));
+    let metric = metrics::find(&args.metric).ok_or_else(unknown)?;
     let Some((reference, paths)) = args.images.split_last() else { bail!("there is no image") };
     let images = paths.iter().map(|path| io::read_picture(path)).collect::<Result<Vec<_>, _>>()?;
     let path_of_reference = reference;

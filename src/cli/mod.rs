@@ -62,13 +62,13 @@ enum Command {
     Job(job::Args),
     /// Add up the samples of checkpoints, from other machines or seeds
     Merge(merge::Args),
-    /// Show what a scene holds and needs, or what Fluxion knows
+    /// Describe a scene and its plan, or list methods, layers, plugins, kernels and metrics
     Info(info::Args),
-    /// Try hostile frames, systems and scenes: numerical stability, as a table
+    /// Check numerical stability on hostile frames, systems and scenes
     Stress(stress::Args),
     /// Render bundled scenes and check them against their references
     Validate(validate::Args),
-    /// Print a script that completes this program's commands and options in a shell
+    /// Print a shell's script for completing commands and options
     Completions {
         /// Shell that is to complete them
         shell: clap_complete::Shell,
@@ -79,7 +79,7 @@ enum Command {
         #[arg(short, long, value_name = "DIR")]
         output: PathBuf,
     },
-    /// Print the JSON Schema of what is written as JSON
+    /// Print the JSON Schema of a kind of output
     Schema {
         /// Kind of JSON
         #[arg(value_enum)]

@@ -1,5 +1,6 @@
 //! Progress: a bar where someone is watching, lines where nobody is, or where a program reads them.
 
+use fluxion::internals::sync::lock;
 use std::io::IsTerminal;
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
@@ -73,7 +74,7 @@ impl Progress {
     pub fn set_message(&self, stage: &str) {
         self.drawn.set_message(stage.to_owned());
         if let Some(lines) = &self.lines {
-            stage.clone_into(&mut lines.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).stage);
+            stage.clone_into(&mut lock(lines).stage);
         }
     }
 
@@ -82,7 +83,7 @@ impl Progress {
         let share = share.clamp(0.0, 1.0);
         self.drawn.set_position((share * STEPS as f32) as u64);
         if let Some(lines) = &self.lines {
-            lines.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).report(share);
+            lock(lines).report(share);
         }
     }
 

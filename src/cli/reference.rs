@@ -24,10 +24,10 @@ pub struct Args {
     /// Stop when the estimated relMSE of the reference itself is at most this
     #[arg(long, value_name = "RELMSE", required_unless_present_any = ["time", "spp"], value_parser = parse_floor)]
     target_floor: Option<f64>,
-    /// Stop after about so long in all, as in 90s, 30m or 2h
+    /// Stop after about this total time, as in 90s, 30m or 2h
     #[arg(long, value_name = "TIME", value_parser = super::parse_time)]
     time: Option<Duration>,
-    /// Stop at so many samples per pixel
+    /// Stop at this number of samples per pixel
     #[arg(long, value_parser = clap::value_parser!(u32).range(2..1 << 30))]
     spp: Option<u32>,
     #[command(flatten)]

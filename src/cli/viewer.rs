@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Result, anyhow};
 use fluxion::film::Layer;
 use fluxion::image::Image;
+use fluxion::internals::sync::lock;
 use fluxion::render::{FilmSink, RenderOutcome};
 use tev_client::{PacketCreateImage, PacketUpdateImage, TevClient};
 
@@ -87,7 +88,7 @@ impl Viewer {
     }
 
     fn state(&self) -> MutexGuard<'_, State> {
-        self.state.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
+        lock(&self.state)
     }
 
     /// Shows an image instead of the last one. A viewer that has gone away is said once, and no reason to stop.

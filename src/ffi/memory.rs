@@ -28,7 +28,7 @@ fn fail(bytes: usize) -> ! {
     // Formatting into an unbuffered stream allocates nothing. Its failure cannot be reported.
     let _ = writeln!(
         std::io::stderr(),
-        "error: out of memory: {bytes} bytes more are not to be had; a smaller --size or --max-memory takes less{kept}"
+        "error: out of memory: cannot allocate {bytes} bytes; a smaller --size or --max-memory takes less{kept}"
     );
     // SAFETY: takes no pointer and does not return.
     unsafe { _exit(1) }

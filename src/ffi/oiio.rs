@@ -11,6 +11,7 @@ use super::shim::{self, shim};
 use crate::error::{Error, Result};
 use crate::pixels::parts::{self, Merged, Part};
 use crate::pixels::{DataWindow, Header, Kind, OpenImage, Pixels, Storage, exr_header};
+use crate::sync::lock;
 
 /// OpenImageIO's name of a kind of samples.
 fn name(kind: Kind) -> &'static CStr {
@@ -204,7 +205,7 @@ static FAILED: Mutex<Option<(PathBuf, u64)>> = Mutex::new(None);
 
 /// Lookups since the program started that found no texel since their file was gone or damaged, and the first such file.
 pub fn failed_lookups() -> Option<(PathBuf, u64)> {
-    FAILED.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).clone()
+    lock(&FAILED).clone()
 }
 
 // SAFETY: as for the system that owns the texture.
@@ -243,7 +244,7 @@ impl CachedTexture {
         // SAFETY: the system is alive, the texture is one of its own, and `samples` has room for `count` floats.
         if !unsafe { shim().fluxion_texture_texel(self.system.0, self.texture, x, y, count, samples.as_mut_ptr()) } {
             samples.fill(0.0);
-            let mut failed = FAILED.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+            let mut failed = lock(&FAILED);
             failed.get_or_insert_with(|| (self.path.clone(), 0)).1 += 1;
         }
     }

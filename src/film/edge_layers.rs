@@ -102,8 +102,8 @@ pub fn channels(edges: &Edges) -> Result<Vec<(String, Vec<f32>)>, String> {
     Ok(channels)
 }
 
-/// Edges from the channels of a file, if it has masks of neighbours. `channel` finds one by its name. Masks say between which
-/// pixels there are edges, whichever end says so. Numbers of samples are those of the frame's ends.
+/// Edges from the channels of a file, if it has masks of neighbours. `channel` finds one by its name. An edge
+/// exists if either end's mask has it. Numbers of samples are those of the frame's ends.
 pub fn edges(frame: &Frame, channel: impl Fn(&str) -> Option<Vec<f32>>) -> Option<Edges> {
     let (masks, size) = (channel(MASKS)?, (frame.width, frame.height));
     let neighbours = Neighbours::new(size, masks.iter().map(|&mask| mask as u32).collect(), true);

@@ -40,7 +40,7 @@ impl Frame {
     /// variance, and bins of as many of them as there are powers of two, eight at most.
     pub fn of_renders(renders: &[Image], spp: u32) -> Result<Self> {
         let [first, _, ..] = renders else {
-            return Err(Error::Usage(format!("{} renders tell no variance: give two or more", renders.len())));
+            return Err(Error::Usage(format!("a variance takes two or more renders: there are {}", renders.len())));
         };
         let fits = |render: &Image| render.shape() == first.shape();
         if first.is_empty() || first.channels != 3 || !renders.iter().all(fits) || spp == 0 {

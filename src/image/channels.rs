@@ -13,7 +13,7 @@ pub enum Decoding {
     Linear,
     /// Display-encoded, as integers of any size are outside of exr files.
     Srgb,
-    /// Encoded by a power of one over this.
+    /// Gamma-encoded with exponent one over this.
     Gamma(f32),
     /// Integers of an exr file, which OpenImageIO gives as shares of the largest.
     Integer,
@@ -77,7 +77,12 @@ impl ColorChannels {
     pub fn of(file: &ImageFile, path: &Path, integers: Integers) -> Result<Self> {
         let (order, is_xyz) = choose(&file.channels).ok_or_else(|| {
             let names = file.channels.join(", ");
-            Error::io(path, format!("its colours cannot be told from the channels {names}; give it R, G and B, or Y, or one layer of them"))
+            Error::io(
+                path,
+                format!(
+                    "no colours were found among the channels {names}; give it R, G and B, or Y, or one layer of them"
+                ),
+            )
         })?;
         let own = || file.attribute("chromaticities").and_then(|text| primaries(&text));
         let is_grey = order[0] == order[1];

@@ -74,12 +74,23 @@ impl Planes {
     ) -> Self {
         let mut planes = Self::new(width, height, channels);
         for c in 0..channels {
-            planes.interior(c).enumerate().for_each(|(y, row)| {
+            planes.fill_rows(c, &|y, row| {
                 row.iter_mut().enumerate().for_each(|(x, slot)| *slot = value(c, x, y));
             });
         }
         planes.mirror_border();
         planes
+    }
+
+    /// Fills the rows of a plane in parallel. Callers share its code: with a type of `fill` in place of a reference there would be a
+    /// copy of the scheduler in every one of them.
+    fn fill_rows(&mut self, c: usize, fill: &(dyn Fn(usize, &mut [f32]) + Sync)) {
+        self.interior(c).enumerate().for_each(|(y, row)| fill(y, row));
+    }
+
+    /// Planes of the same size, made in parallel; all of its callers share its code, too.
+    fn made(&self, channels: usize, make: &(dyn Fn(usize) -> Vec<f32> + Sync)) -> Self {
+        Self { planes: (0..channels).into_par_iter().map(make).collect(), ..*self }
     }
 
     /// Planes whose tiles are computed in parallel: `compute` returns a tile's channels one after the other.
@@ -88,6 +99,15 @@ impl Planes {
         height: usize,
         channels: usize,
         compute: impl Fn(PlaneTile) -> Vec<f32> + Sync,
+    ) -> Self {
+        Self::of_tiles(width, height, channels, &compute)
+    }
+
+    fn of_tiles(
+        width: usize,
+        height: usize,
+        channels: usize,
+        compute: &(dyn Fn(PlaneTile) -> Vec<f32> + Sync),
     ) -> Self {
         let mut planes = Self::new(width, height, channels);
         for y in (0..height).step_by(TILE) {
@@ -194,14 +214,13 @@ impl Planes {
 
     /// Planes whose values are a function of these here and those of `other` there.
     pub fn zip(&self, other: &Self, f: impl Fn(f32, f32) -> f32 + Sync) -> Self {
-        let zip = |(a, b): (&Vec<f32>, &Vec<f32>)| a.iter().zip(b).map(|(&a, &b)| f(a, b)).collect();
-        Self { planes: self.planes.par_iter().zip(&other.planes).map(zip).collect(), ..*self }
+        let channels = self.planes.len().min(other.planes.len());
+        self.made(channels, &|c| self.planes[c].iter().zip(&other.planes[c]).map(|(&a, &b)| f(a, b)).collect())
     }
 
     /// Planes whose values are a function of these.
     pub fn map(&self, f: impl Fn(f32) -> f32 + Sync) -> Self {
-        let map = |plane: &Vec<f32>| plane.iter().map(|&value| f(value)).collect();
-        Self { planes: self.planes.par_iter().map(map).collect(), ..*self }
+        self.made(self.planes.len(), &|c| self.planes[c].iter().map(|&value| f(value)).collect())
     }
 
     /// Means over squares of the given radius around every pixel.

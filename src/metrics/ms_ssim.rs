@@ -15,7 +15,7 @@ const EXPONENTS: [f64; 5] = [0.0448, 0.2856, 0.3001, 0.2363, 0.1333];
 const RADIUS: usize = 5;
 const SIGMA: f64 = 1.5;
 
-/// Limits of luminance and contrast below which nothing is told apart.
+/// Limits of luminance and contrast below which nothing is distinguished.
 const LIMITS: [f64; 2] = [0.01 * 0.01, 0.03 * 0.03];
 
 /// A channel.

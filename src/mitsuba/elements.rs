@@ -83,7 +83,7 @@ impl Parser {
 
     fn object(&mut self, at: At) -> Result<Rc<Object>> {
         let mut plugin = match self.optional(at, "type")? {
-            // Types are names of files, which have no capitals, and not every system tells these apart.
+            // Types are names of files, which have no capitals, and not every system distinguishes case.
             Some(plugin) => plugin.to_lowercase(),
             None => {
                 return Err(at

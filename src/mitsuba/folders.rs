@@ -70,7 +70,7 @@ fn folder_of(path: &Path) -> PathBuf {
     path.parent().unwrap_or(Path::new("")).to_path_buf()
 }
 
-/// The file that a name with other slashes or in other case stands for, as on the systems that do not tell them apart.
+/// The file that a name with other slashes or in other case stands for, as on the systems that do not distinguish them.
 fn similar(folder: &Path, name: &str) -> Option<PathBuf> {
     let name = name.replace('\\', "/");
     // A drive's letter means nothing here.

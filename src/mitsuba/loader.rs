@@ -294,7 +294,7 @@ impl Loader for FileLoader {
         }
         let infinite = odd.infinite;
         if infinite > 0 {
-            let what = format!("{infinite} texels are not finite: infinity counts as 65504, what is no number as zero");
+            let what = format!("{infinite} texels are not finite: infinity counts as 65504, NaN as zero");
             self.warn(&SourceLoc::file(&path), &what)?;
         }
         let texels = Arc::new(texels);

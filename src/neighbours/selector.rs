@@ -28,10 +28,8 @@ impl Selector {
     /// if it needs one.
     pub fn parse(text: &str, pilot: Option<u32>) -> Result<Self> {
         let (id, parameters) = text.split_once(':').unwrap_or((text, ""));
-        let kind = KERNELS.iter().position(|kind| kind.id == id).ok_or_else(|| {
-            let names: Vec<_> = KERNELS.iter().map(|kind| kind.id).collect();
-            Error::Usage(format!("kernel `{id}` is not known; there are {}", names.join(", ")))
-        })?;
+        let unknown = || Error::unknown("kernel", id, KERNELS.iter().map(|kind| kind.id));
+        let kind = KERNELS.iter().position(|kind| kind.id == id).ok_or_else(unknown)?;
         let row = &KERNELS[kind];
         let samples = row.pilot.map_or(0, |needs| pilot.unwrap_or(needs.samples));
         let least = row.pilot.map_or(0, |needs| needs.least);

@@ -3,7 +3,7 @@
 //! s = min over features of exp(-max(0, |g_i - g_j|² - d) / b²),
 //!
 //! with a bandwidth b of each feature, and d twice the noise of both pixels and a part of b². Pixels that differ by no more have a
-//! similarity of one, and of equally similar ones the nearest are taken, so that the kernel is a cross where nothing tells pixels
+//! similarity of one, and of equally similar ones the nearest are taken, so that the kernel is a cross where nothing distinguishes pixels
 //! apart. Bandwidths and d are ours: the paper leaves them to its users.
 
 use rayon::prelude::*;
@@ -22,7 +22,7 @@ pub const KERNEL: KernelKind = KernelKind {
     select,
 };
 
-/// Least similarity of a neighbour, unless told otherwise.
+/// Least similarity of a neighbour by default.
 pub const THRESHOLD: f32 = 0.3;
 
 /// Squared difference, of the squared bandwidth, that counts as none: slopes would choose the kernel otherwise.

@@ -29,10 +29,15 @@ impl Tensor {
         fill: impl Fn(usize, usize, &mut [f32]) + Sync,
     ) -> Self {
         let mut made = Self::new(width, height, channels);
-        made.rows_mut().for_each(|(y, row)| {
+        made.fill_rows(&|y, row| {
             row.chunks_exact_mut(channels).enumerate().for_each(|(x, pixel)| fill(x, y, pixel));
         });
         made
+    }
+
+    /// Fills the rows in parallel, by code that all callers share.
+    fn fill_rows(&mut self, fill: &(dyn Fn(usize, &mut [f32]) + Sync)) {
+        self.rows_mut().for_each(|(y, row)| fill(y, row));
     }
 
     /// The channels of a pixel.

@@ -1,7 +1,7 @@
 //! Checkpoints of a run: when they are written, and how they are resumed.
 
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, MutexGuard};
 use std::time::{Duration, Instant};
 
 use super::host::Host;
@@ -11,6 +11,7 @@ use crate::checkpoint::{self, Origin};
 use crate::error::{Error, Result};
 use crate::files::Lock;
 use crate::render::{FilmSink, RenderOutcome};
+use crate::sync::lock;
 
 /// A file that all samples are saved in from time to time.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -52,7 +53,11 @@ impl Checkpoints {
         let journal = Mutex::default();
         let start = if self.resume && is_there(&self.file) {
             let there = checkpoint::summary(&self.file)?.origin;
-            there.resumes(&origin).map_err(|why| Error::mismatch(&self.file, why))?;
+            if let Err(why) = there.resumes(&origin) {
+                // A header that is damaged is no other scene's.
+                checkpoint::verify(&self.file)?;
+                return Err(Error::mismatch(&self.file, why));
+            }
             checkpoint::load(&self.file)?.resume(&journal)
         } else {
             prepared.start(&journal)
@@ -93,7 +98,7 @@ struct State {
 
 impl CheckpointWriter<'_> {
     fn state(&self) -> MutexGuard<'_, State> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+        lock(&self.state)
     }
 
     fn conclude<T>(&self, made: Result<T>) -> Result<T> {
@@ -108,7 +113,7 @@ impl CheckpointWriter<'_> {
 
     /// Writes a checkpoint. The error says which one is still there.
     fn write(&self, outcome: &RenderOutcome) -> Result<(), Error> {
-        let journal = self.journal.lock().unwrap_or_else(PoisonError::into_inner);
+        let journal = lock(self.journal);
         // Runs without decisions have no journal.
         let decided = !journal.notes.passes.is_empty() || !journal.goals.is_empty();
         let start = Instant::now();

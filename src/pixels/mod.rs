@@ -24,7 +24,7 @@ pub enum Kind {
 pub enum Storage {
     /// Floats of any size.
     Float,
-    /// Integers of so many bits, read as shares of the largest.
+    /// Integers of a number of bits, read as shares of the largest.
     Unsigned(u32),
     /// Signed integers and other types that pictures rarely have.
     Other,
@@ -102,7 +102,7 @@ const MAX_SAMPLES: usize = 1 << 32;
 /// pictures like that.
 const MAX_SAMPLES_PER_BYTE: usize = 1 << 11;
 
-/// Rows that some of OpenEXR's compressions work on at once, and the samples in them that are no reason for doubt.
+/// Rows that some of OpenEXR's compressions work on at once, and the number of samples in them that is accepted without a check.
 const ROWS_AT_ONCE: usize = 256;
 const ROOM: usize = 1 << 27;
 
@@ -118,7 +118,7 @@ impl Header {
         self.storage.iter().all(|storage| *storage == Storage::Unsigned(8))
     }
 
-    /// Fails if a file of so many bytes cannot hold what its header claims.
+    /// Fails if a file of this number of bytes cannot hold what its header claims.
     pub fn check(&self, path: &Path, bytes: usize) -> Result<()> {
         let (width, height, samples) = (self.width, self.height, self.samples());
         if samples == 0 || samples > MAX_SAMPLES.min(bytes.saturating_mul(MAX_SAMPLES_PER_BYTE)) {

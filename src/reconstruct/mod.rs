@@ -68,8 +68,8 @@ pub struct Context<'a> {
 }
 
 impl Context<'_> {
-    /// Runs a part of a method within the memory that is left beside so many bytes that are held; what it lacks is told with
-    /// them.
+    /// Runs a part of a method within the memory that is left when `held` bytes are taken off; an error names the sum of
+    /// both.
     fn beside<T>(&self, held: u64, work: impl FnOnce(Option<u64>) -> Result<T>) -> Result<T> {
         work(self.memory.map(|memory| memory.saturating_sub(held))).map_err(|error| match error {
             Error::TooLittleMemory { method, size, bytes } => {
@@ -213,10 +213,8 @@ pub const DEFAULT: &str = "net";
 /// Builds the method that a text such as `l2:alpha=0.2` names.
 pub fn parse(text: &str) -> Result<Box<dyn Reconstruction>> {
     let (id, values) = text.split_once(':').unwrap_or((text, ""));
-    let method = METHODS.iter().find(|method| method.id == id).ok_or_else(|| {
-        let names: Vec<_> = METHODS.iter().map(|method| method.id).collect();
-        Error::Usage(format!("method `{id}` is not known; there are {}", names.join(", ")))
-    })?;
+    let unknown = || Error::unknown("method", id, METHODS.iter().map(|method| method.id));
+    let method = METHODS.iter().find(|method| method.id == id).ok_or_else(unknown)?;
     (method.make)(&Parameters::parse(method, values)?)
 }
 

@@ -16,6 +16,7 @@ use crate::film::{EdgeNeed, Film, Kernel, Needs, Rejected, Sample, TILE, Tile};
 use crate::math::Rgb;
 use crate::neighbours::{Encoder, Pilot, Selector};
 use crate::scene::Scene;
+use crate::sync::{into_inner, lock};
 
 /// Limit of a render.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -236,11 +237,11 @@ fn run_tiles(
         let before = tile.samples();
         if let Some(rejected) = run_tile(settings, wave, (tile, number), (&outcome.choices, pending), (goals, control))
         {
-            let mut first = first_rejected.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+            let mut first = lock(&first_rejected);
             first.get_or_insert(rejected);
         }
         let worked = tile.samples() > before;
-        let mut done = done.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        let mut done = lock(&done);
         *done += 1;
         (control.progress)(*done as f32 / total as f32);
         // A tile that was at its goal already is no reason for another pause.
@@ -248,7 +249,7 @@ fn run_tiles(
             due.store(true, Ordering::Relaxed);
         }
     });
-    outcome.first_rejected = first_rejected.into_inner().unwrap_or_else(|poisoned| poisoned.into_inner());
+    outcome.first_rejected = into_inner(first_rejected);
     due.into_inner()
 }
 

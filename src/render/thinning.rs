@@ -76,6 +76,6 @@ mod tests {
         assert!(!shares.has_differences(0, FIRST, || costly));
         assert!(shares.has_differences(0, FIRST + 1, || unreachable!("known by now")));
         shares.learn(1, Work { paths: 1.0, offsets: 0.0 });
-        assert!((0..99).all(|number| shares.has_differences(1, number, || unreachable!("told before"))));
+        assert!((0..99).all(|number| shares.has_differences(1, number, || unreachable!("decided before"))));
     }
 }

@@ -40,7 +40,7 @@ impl<'a> PathTracer<'a> {
     }
 
     fn trace_from(&mut self, camera: &CameraSamples, steps: &[(i32, i32)], keep_all: bool, record: &mut PathRecord) {
-        // Neighbours' paths are there for the differences of all light.
+        // Light groups are not recorded on offset paths.
         let groups = if steps.is_empty() { self.needs.lights } else { 0 };
         record.start(camera.pixels.len(), usize::from(groups));
         self.start(camera, steps);

@@ -25,7 +25,7 @@ impl Row {
     /// For every kind of figure the one that is nearest to its bound, or farthest beyond.
     pub fn worst(&self) -> Vec<&Check> {
         let mut worst: Vec<&Check> = Vec::new();
-        // A figure that is no number is the worst of all.
+        // NaN is the worst of all.
         let used = |check: &Check| if check.value.is_nan() { f64::INFINITY } else { check.value - check.bound };
         for check in &self.checks.list {
             match worst.iter_mut().find(|other| other.measure == check.measure) {

@@ -344,7 +344,7 @@ impl Scene {
         self.accel.bounds()
     }
 
-    /// Hash of the scene's text, to tell scenes apart.
+    /// Hash of the scene's text, which distinguishes scenes.
     pub fn fingerprint(&self) -> u64 {
         self.fingerprint
     }

@@ -4,6 +4,7 @@
 use std::sync::Mutex;
 
 use crate::ffi::embree::{Committed, Ray, Rays};
+use crate::sync::lock;
 
 /// A logged query.
 enum Call {
@@ -19,7 +20,7 @@ pub struct RayLog(Mutex<Vec<Call>>);
 
 impl RayLog {
     fn add(&self, call: Call) {
-        self.0.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).push(call);
+        lock(&self.0).push(call);
     }
 
     /// First hit of a ray.
@@ -44,7 +45,7 @@ impl RayLog {
 
     /// Traces all rays again; returns their number and the number of hits.
     pub fn replay(&self, scene: &Committed) -> (usize, usize) {
-        let calls = self.0.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        let calls = lock(&self.0);
         let (mut rays, mut met) = (0, 0);
         let active = |packet: &Rays| packet.active.iter().filter(|lane| **lane != 0).count();
         for call in calls.iter() {

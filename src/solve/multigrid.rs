@@ -220,12 +220,17 @@ impl Multigrid {
 
 /// Computes every value, in parallel.
 fn each(out: &mut [Quad], value: impl Fn(usize) -> Quad + Sync) {
-    out.par_iter_mut().enumerate().with_min_len(CHUNK).for_each(|(i, out)| *out = value(i));
+    in_chunks(out, &|first, chunk| (first..).zip(chunk).for_each(|(i, out)| *out = value(i)));
 }
 
 /// Replaces every value by a function of it, in parallel.
 fn update(out: &mut [Quad], value: impl Fn(usize, &Quad) -> Quad + Sync) {
-    out.par_iter_mut().enumerate().with_min_len(CHUNK).for_each(|(i, out)| *out = value(i, out));
+    in_chunks(out, &|first, chunk| (first..).zip(chunk).for_each(|(i, out)| *out = value(i, out)));
+}
+
+/// Works on chunks in parallel, each with the number of its first value. All callers share its code.
+fn in_chunks(out: &mut [Quad], work: &(dyn Fn(usize, &mut [Quad]) + Sync)) {
+    out.par_chunks_mut(CHUNK).enumerate().for_each(|(k, chunk)| work(k * CHUNK, chunk));
 }
 
 fn cholesky(graph: &Graph) -> Vec<f64> {

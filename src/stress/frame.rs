@@ -59,7 +59,7 @@ pub fn mse(a: &Image, b: &Image) -> f64 {
 /// Largest difference of two pictures, as a share of the largest value of the second.
 pub fn farthest(a: &Image, b: &Image) -> f64 {
     let largest = b.data.iter().map(|&value| f64::from(value).abs()).fold(f64::MIN_POSITIVE, f64::max);
-    // Not a maximum of floats, which would pass over what is no number.
+    // Not a maximum of floats, which would pass over NaN.
     let apart = a.data.iter().zip(&b.data).map(|(&a, &b)| (f64::from(a) - f64::from(b)).abs() / largest);
     apart.fold(0.0, |most, apart| if apart <= most { most } else { apart })
 }

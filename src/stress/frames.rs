@@ -1,4 +1,4 @@
-//! Frames that no method likes.
+//! Hostile frames.
 
 use super::frame::{COLOR, SIZE, average, denoisers, farthest, methods, mse, names, noisy, not_finite, run};
 use super::{Case, Checks};
@@ -14,9 +14,9 @@ pub const CASES: &[Case] = &[
     Case { name: "frames/constant", summary: "one colour without noise stays what it is", run: constant },
     Case { name: "frames/sizes", summary: "every size: a frame without noise stays what it is", run: sizes },
     Case { name: "frames/firefly", summary: "one pixel of 1e8 among ones: what is far from it stays", run: firefly },
-    Case { name: "frames/unlit", summary: "30 % of pixels whose samples were all zero, variance and all", run: unlit },
+    Case { name: "frames/unlit", summary: "30 % of pixels with zero mean and variance", run: unlit },
     Case { name: "frames/variances", summary: "variances from 1e-12 to 1e12 side by side, no noise", run: variances },
-    Case { name: "frames/edges", summary: "differences off by 1e6 that admit it by their variance", run: wild_edges },
+    Case { name: "frames/edges", summary: "differences off by 1e6 with matching variance", run: wild_edges },
     Case { name: "frames/exposure", summary: "radiance of 1e-8 and 1e8: the same picture as of 1", run: exposure },
     Case { name: "frames/denormal", summary: "radiance of 1e-40", run: denormal },
     Case { name: "frames/not-finite", summary: "NaN or infinity in any layer is an error naming it", run: not_numbers },

@@ -7,11 +7,7 @@ use crate::math::Rgb;
 use crate::synthetic::random;
 
 pub const CASES: &[Case] = &[
-    Case {
-        name: "film/samples",
-        summary: "samples that are no numbers, or larger than their squares can be",
-        run: samples,
-    },
+    Case { name: "film/samples", summary: "samples that are NaN, or too large to be squared", run: samples },
     Case { name: "film/many", summary: "a million samples of a pixel", run: many },
     Case { name: "film/merge", summary: "films of quarters of the samples, in any order, and of all", run: merge },
 ];

@@ -239,7 +239,9 @@ fn scripts_for_schedulers_carry_out_the_plan() {
     let steps = template["steps"].as_array().unwrap();
     assert_eq!(steps[0]["parameterSpace"]["taskParameterDefinitions"][0]["range"], "0-3");
     let words = |step: usize| steps[step]["script"]["actions"]["onRun"]["args"].as_array().unwrap();
-    assert!(words(0)[..2] == ["job", "run"] && words(1)[..2] == ["job", "merge"] && words(0)[2] == words(1)[2]);
+    assert!(
+        words(0)[..3] == ["job", "run", "--quiet"] && words(1)[..2] == ["job", "merge"] && words(0)[3] == words(1)[2]
+    );
 }
 
 #[test]
@@ -256,7 +258,7 @@ fn frames_are_images_of_their_own_and_scenes_must_not_change() {
         let line = ["job", "plan", "lamp.xml", "--frames", frames, "--spp", "16", "--chunks", "2", "-o", to];
         expect(at, &[&line[..], &["--", "--method", "primal", "-q"]].concat(), code, part);
     };
-    plan("3-1", "none", 2, "no range such as 1-250");
+    plan("3-1", "none", 2, "not a range such as 1-250");
     plan("9-11", "j", 0, "6 chunks");
     for chunk in ["0", "1", "2", "3", "4"] {
         expect(at, &["job", "run", "j", chunk], 0, "");

@@ -54,7 +54,11 @@ const RETIRED: &[&str] = &[
 const RIDDLES: &[&str] = &["What ", "Which ", "Where ", "Whose ", "It ", "Those ", "Of ", "Told "];
 
 /// Phrases that documents do without.
-const PHRASES: &[&str] = &["gone on with", "dealt", "glow", "falls short", "asked for:"];
+const PHRASES: &[&str] = &["gone on with", "dealt", "glow", "falls short", "asked for:", "have their say"];
+
+/// Phrases that comments, help texts and messages do without: NaN is a term, and readers are told, not networks or options.
+const IN_CODE: &[&str] =
+    &["no number", "no numbers", "is told", "are told", "cannot be told", "to be had", "its say", "whichever end says"];
 
 #[test]
 fn retired_words_stay_out_of_the_code() {
@@ -65,6 +69,21 @@ fn retired_words_stay_out_of_the_code() {
             for word in words.filter(|word| RETIRED.contains(word)) {
                 found.push(format!("{name}:{}: `{word}`", number + 1));
             }
+        }
+    }
+    assert!(found.is_empty(), "{}", found.join("\n"));
+}
+
+#[test]
+fn comments_and_messages_are_in_plain_english() {
+    let mut found = Vec::new();
+    for (name, text) in sources() {
+        for (number, line) in text.lines().enumerate() {
+            let whole = |phrase: &&&str| {
+                let after = line.split_once(**phrase).map(|(_, rest)| rest.chars().next());
+                after.is_some_and(|next| !next.is_some_and(char::is_alphanumeric))
+            };
+            found.extend(IN_CODE.iter().filter(whole).map(|phrase| format!("{name}:{}: `{phrase}`", number + 1)));
         }
     }
     assert!(found.is_empty(), "{}", found.join("\n"));

@@ -24,6 +24,7 @@ use std::sync::{Arc, Mutex};
 
 use super::raw::embree as raw;
 use crate::error::{Error, Result};
+use crate::sync::lock;
 
 /// B-splines or straight pieces.
 pub use raw::FluxionCurveKind as CurveKind;
@@ -60,7 +61,7 @@ unsafe impl Sync for DeviceHandle {}
 
 impl DeviceHandle {
     fn check(&self) -> Result<()> {
-        let mut reported = self.reported.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        let mut reported = lock(&self.reported);
         reported.take().map_or(Ok(()), |message| Err(Error::backend("embree", message)))
     }
 }
@@ -75,7 +76,7 @@ impl Drop for DeviceHandle {
 unsafe extern "C" fn remember(user: *mut c_void, code: c_int, message: *const c_char) {
     // SAFETY: Embree passes back the address of the reported error given at creation, and a NUL-terminated string.
     let (reported, message) = unsafe { (&*user.cast::<Reported>(), CStr::from_ptr(message)) };
-    let mut slot = reported.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+    let mut slot = lock(reported);
     let message = message.to_string_lossy();
     // Embree's own message says only that something failed.
     let memory = if code == OUT_OF_MEMORY { ": out of memory" } else { "" };

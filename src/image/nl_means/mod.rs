@@ -1,4 +1,4 @@
-//! Non-local means: pixels are averaged with those whose surroundings look the same, as far as noise lets tell
+//! Non-local means: pixels are averaged with those whose surroundings look the same, as far as noise lets this be seen
 //! (Buades et al. 2005; Rousselle et al. 2012, 2013).
 
 mod distance;

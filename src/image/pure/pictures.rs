@@ -18,7 +18,7 @@ use crate::pixels::{Header, Kind, Pixels, Storage};
 /// Quality of jpg files, of a hundred.
 const QUALITY: u8 = 98;
 
-/// A format that the library tells from the file's first bytes or, where these say nothing, its extension.
+/// A format that the library recognises by the file's first bytes or, where these say nothing, its extension.
 struct Picture;
 
 fn reader(path: &Path) -> Result<ImageReader<std::io::BufReader<File>>> {

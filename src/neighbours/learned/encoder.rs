@@ -1,11 +1,12 @@
 //! Samples of a pilot, encoded one by one as they are taken, so that they never are in memory together.
 
-use std::sync::{Mutex, PoisonError};
+use std::sync::Mutex;
 
 use super::SLOPE;
 use crate::film::{Frame, Layer, Sample};
 use crate::nn::{Activation, Convolution, Tensor, Weights};
 use crate::scene::sensor::Sensor;
+use crate::sync::lock;
 
 /// Values of a sample: colour 3, albedo 3, normal 3, depth, roughness, kinds of scattering 6.
 pub const FEATURES: usize = 17;
@@ -80,7 +81,7 @@ impl Encoder {
         for layer in &self.layers {
             values = layer.apply(&values);
         }
-        let mut totals = self.totals.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut totals = lock(&self.totals);
         let Totals { sum, most, counts } = &mut *totals;
         for (&pixel, values) in pixels.iter().zip(values.data.chunks_exact(CHANNELS)) {
             counts[pixel] = counts[pixel].saturating_add(1);
@@ -108,7 +109,7 @@ impl Encoder {
 
     /// Means, largest values and what `positions` says of every pixel, mirrored until both sides are multiples of a number.
     pub(super) fn encoded(&self, multiple: usize, positions: impl Fn(usize, usize, &mut [f32]) + Sync) -> Tensor {
-        let totals = self.totals.lock().unwrap_or_else(PoisonError::into_inner);
+        let totals = lock(&self.totals);
         let (width, height) = self.size;
         let mirrored = |at: usize, side: usize| if at < side { at } else { (2 * side - 1).saturating_sub(at) % side };
         let (columns, rows) = (width.next_multiple_of(multiple), height.next_multiple_of(multiple));

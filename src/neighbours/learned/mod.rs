@@ -36,7 +36,7 @@ const HALVINGS: usize = 3;
 /// Slope of leaky ReLU.
 const SLOPE: f32 = 0.01;
 
-/// Periods, in pixels, of the sines and cosines of a pixel's column and row. They tell pixels apart where all look the same.
+/// Periods, in pixels, of the sines and cosines of a pixel's column and row. They distinguish pixels where all look the same.
 const PERIODS: [usize; 2] = [4, 16];
 const POSITIONS: usize = 4 * PERIODS.len();
 

@@ -22,6 +22,7 @@ use crate::math::Rgb;
 use crate::render::{SampleSink, Samples, WaveSamples};
 use crate::scene::Scene;
 use crate::scene::sensor::Sensor;
+use crate::sync::{into_inner, lock};
 
 /// Writes the samples of a render into a folder.
 pub struct SampleWriter {
@@ -82,7 +83,7 @@ pub struct Entry {
 }
 
 impl SampleWriter {
-    /// Makes the files for so many samples of every pixel, with room for all of them.
+    /// Preallocates the files for `spp` samples of every pixel.
     pub fn new(folder: &Path, scene: &Scene, spp: u32) -> Result<Self> {
         std::fs::create_dir_all(folder).map_err(|error| Error::io(folder, error))?;
         let sensor = scene.sensor().clone();
@@ -97,10 +98,10 @@ impl SampleWriter {
 
     /// Completes the folder by what is known of the whole film. The error is the first that has occurred while writing.
     pub fn finish(self, film: &Film, provenance: &Provenance) -> Result<()> {
-        if let Some(error) = self.failed.into_inner().unwrap_or_else(|poisoned| poisoned.into_inner()) {
+        if let Some(error) = into_inner(self.failed) {
             return Err(error);
         }
-        let positions = self.film.into_inner().unwrap_or_else(|poisoned| poisoned.into_inner());
+        let positions = into_inner(self.film);
         npy::write(&self.folder.join("film.npy"), &[self.spp as usize, 2], &positions, Number::Float32)?;
         let mut arrays: Vec<_> =
             self.columns.iter().zip(COLUMNS).map(|(array, column)| array.entry(column.content)).collect();
@@ -176,7 +177,7 @@ impl SampleWriter {
 
     /// Keeps the first error.
     fn note<T>(&self, result: Result<T>) -> Option<T> {
-        let mut failed = self.failed.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        let mut failed = lock(&self.failed);
         match result {
             Ok(value) => Some(value),
             Err(error) => {
@@ -192,7 +193,7 @@ impl SampleSink for SampleWriter {
         if wave.number >= self.spp {
             return;
         }
-        let mut film = self.film.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        let mut film = lock(&self.film);
         film[2 * wave.number as usize..][..2].copy_from_slice(&wave.film.to_array());
         drop(film);
         self.note(self.write(wave));
@@ -224,7 +225,7 @@ impl Array {
         Ok(Self { path, file, start: header.len() as u64, shape })
     }
 
-    /// The same with values that are no numbers.
+    /// Preallocates a file filled with NaN.
     fn without_values(self) -> Result<Self> {
         let row: usize = self.shape[2..].iter().product();
         let blank = vec![f32::NAN; row];

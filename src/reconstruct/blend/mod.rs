@@ -148,7 +148,7 @@ impl Reconstruction for Blend {
         let images: Vec<_> = candidates.iter().map(|image| inputs.mirrored(image, inputs.scale)).collect();
         drop(candidates);
         let evidence = Evidence::new(&inputs, &images, BEST)?;
-        let weights = self.network.weights(&evidence.features(inputs.told_samples()));
+        let weights = self.network.weights(&evidence.features(inputs.samples_input()));
         let kept = if self.safety { evidence.safe(weights, inputs.spp) } else { weights };
         let notes = if context.notes { notes(&kept, &inputs) } else { Vec::new() };
         Ok(Solution { image: mixed(&images, &kept, &inputs), alpha: None, error, notes })

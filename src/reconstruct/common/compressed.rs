@@ -14,7 +14,7 @@ const MU: f32 = 16.0;
 /// Largest compressed value that is decompressed.
 const MOST: f32 = 4.0;
 
-/// Largest deviation that is told, in units of the typical luminance: of a difference that was never sampled it is infinite.
+/// Upper bound of deviations that are given, in units of the typical luminance: that of a difference that was never sampled is infinite.
 const MOST_NOISE: f32 = 1e3;
 
 /// Share of the depths that is below the one that counts as 1.
@@ -34,7 +34,7 @@ pub fn given(inputs: &Inputs, images: &[&Planes], more: &[&Planes], variance: Op
     let [[dx, of_dx], [dy, of_dy]] = [inputs.gradient(0)?, inputs.gradient(1)?];
     let deviation = |variance: &Planes| mean(&variance.map(|variance| variance.sqrt().min(MOST_NOISE)));
     let noise = variance.map(|variance| [variance, &of_dx, &of_dy].map(deviation));
-    let samples = inputs.told_samples();
+    let samples = inputs.samples_input();
     let of_images = |images: &[&Planes]| images.iter().map(|image| image.channels()).sum::<usize>();
     let of_noise = if noise.is_some() { 4 } else { 0 };
     let channels = of_images(images) + of_images(more) + FEATURES + NOISELESS_DIFFERENCES + of_noise;

@@ -48,8 +48,8 @@ impl<'a> Inputs<'a> {
         Ok(Self { frame, width, height, scale, spp })
     }
 
-    /// Number of samples as networks are told of it: its logarithm, of more than [`TRAINED_SAMPLES`] that of these.
-    pub fn told_samples(&self) -> f32 {
+    /// Number of samples as an input of networks: its logarithm, bounded by that of [`TRAINED_SAMPLES`].
+    pub fn samples_input(&self) -> f32 {
         libm::log2f(self.spp.min(TRAINED_SAMPLES)) / 4.0
     }
 
@@ -201,12 +201,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn networks_are_told_of_no_more_samples_than_they_were_trained_with() {
-        for (samples, told) in [(1.0, 0.0), (16.0, 1.0), (64.0, 1.5), (4096.0, 1.5)] {
+    fn networks_are_given_no_larger_number_of_samples_than_in_training() {
+        for (samples, given) in [(1.0, 0.0), (16.0, 1.0), (64.0, 1.5), (4096.0, 1.5)] {
             let mut frame = Frame::new(2, 1);
             frame.set(Layer::Color, Image::new(2, 1, 3));
             frame.set(Layer::Samples, Image { data: vec![samples; 2], ..Image::new(2, 1, 1) });
-            assert_eq!(Inputs::new(&frame, 1).unwrap().told_samples(), told, "{samples}");
+            assert_eq!(Inputs::new(&frame, 1).unwrap().samples_input(), given, "{samples}");
         }
     }
 

@@ -232,7 +232,7 @@ impl<'a, const T: usize> Sweeps<'a, T> {
             }
             let vw = v * self.weights[k] * self.scale;
             let curve = length + v - vw - vw + self.cost;
-            // All the way would leave nothing to scale; where nothing curves the quotient is no number: no step.
+            // All the way would leave nothing to scale; where nothing curves the quotient is NaN: no step.
             let lambda = ((self.cost - slope - vw) / curve).max(Lanes::ZERO).min(Lanes::splat(0.999));
             let keep = one - lambda;
             self.cost = keep * keep * self.cost + lambda * (keep + keep) * vw + lambda * lambda * v;

@@ -32,7 +32,7 @@ pub fn features(inputs: &Inputs, images: &[Planes], claimed: &Planes) -> Result<
     let distance =
         (depths.iter().map(|&depth| f64::from(depth.max(0.0))).sum::<f64>() / depths.len() as f64) as f32 + 1e-9;
     let luminances: Vec<Planes> = images.iter().map(mean).collect();
-    let samples = inputs.told_samples();
+    let samples = inputs.samples_input();
     let channels = OTHERS + images.len() - 1;
     Ok(Tensor::from_fn(inputs.width, inputs.height, channels, |x, y, pixel| {
         let (x, y) = (x as isize, y as isize);

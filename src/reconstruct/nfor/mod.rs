@@ -1,5 +1,5 @@
 //! NFOR, nonlinearly weighted first-order regression (Bitterli et al. 2016): colours are fitted by features in windows
-//! whose pixels count by how alike they are. Two halves of the samples, each weighted by the other, tell the error of
+//! whose pixels count by how alike they are. Two halves of the samples, each weighted by the other, estimate the error of
 //! two strengths of filtering; each pixel takes the better one, and a second pass removes the noise that is left.
 //!
 //! The method needs no gradients: plain path tracing.

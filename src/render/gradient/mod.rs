@@ -34,7 +34,7 @@ pub struct ShiftKind {
     pub id: &'static str,
     /// Description for help texts.
     pub summary: &'static str,
-    /// Whether one end of an edge tells all of it: shifted paths cover all paths of the other end.
+    /// Whether one end determines an edge: shifted paths cover all paths of the other end.
     one_sided: bool,
     /// Builds it, from the roughness threshold and whether the ambient light's differences are recorded, too.
     make: fn(f32, bool) -> Box<dyn ShiftMapping>,
@@ -74,7 +74,7 @@ impl Shift {
         SHIFTS[self.kind].id
     }
 
-    /// Whether one end of an edge tells all of it, so that edges may be sampled from there alone.
+    /// Whether one end determines an edge, so that edges may be sampled from there alone.
     pub fn is_one_sided(self) -> bool {
         SHIFTS[self.kind].one_sided
     }

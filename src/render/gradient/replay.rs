@@ -1,6 +1,6 @@
 //! Random replay: the neighbour's path of the same random numbers, camera and lens included. It maps the cube of random
 //! numbers to itself, so that the Jacobian is one and either end of an edge counts half. It never fails, so that one end
-//! tells all of an edge, and is noisier and slower than reconnection.
+//! determines an edge, and is noisier and slower than reconnection.
 
 use super::{ShiftKind, ShiftMapping};
 use crate::render::camera::CameraSamples;

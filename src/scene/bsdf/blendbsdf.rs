@@ -135,7 +135,7 @@ impl Bsdf for Blend {
         self.nested.iter().any(|bsdf| bsdf.transmits())
     }
 
-    /// Only where both agree: the direction of a path does not tell which one it was.
+    /// Only where both agree: the direction of a path does not determine which one it was.
     fn refraction(&self) -> Option<f32> {
         let [first, second] = [0, 1].map(|i| self.nested[i].refraction());
         first.filter(|_| first == second)

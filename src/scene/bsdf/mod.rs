@@ -34,7 +34,17 @@ pub use super::closure::{BsdfSample, Delta, Eval, Lobe};
 use super::Surface;
 use super::closure::Closure;
 use super::texture::{Point, Texture};
-use crate::math::{Rgb, Vec2, Vec3, vec3};
+use crate::math::{Rgb, Vec2, Vec3, vec3, warp};
+
+/// Whether both directions are on the side of a surface that reflects.
+fn are_above(wi: Vec3, wo: Vec3) -> bool {
+    wi.z > 0.0 && wo.z > 0.0
+}
+
+/// A direction of a specular lobe, if the random number `lobe` is below its share, or of a diffuse one; none from behind.
+fn specular_or_diffuse(wi: Vec3, (lobe, share): (f32, f32), u: Vec2, specular: impl FnOnce() -> Vec3) -> Option<Vec3> {
+    (wi.z > 0.0).then(|| if lobe < share { specular() } else { warp::cosine_hemisphere(u) })
+}
 
 /// Share of a specular lobe in sampling beside a diffuse one, by their mean reflectances.
 fn specular_share(diffuse: &dyn Texture, specular: &dyn Texture) -> f32 {

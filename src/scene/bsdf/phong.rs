@@ -3,7 +3,7 @@
 use std::f32::consts::{FRAC_1_PI, TAU};
 use std::sync::Arc;
 
-use super::{Bsdf, BsdfSample, Eval, specular_share};
+use super::{Bsdf, BsdfSample, Eval, are_above, specular_or_diffuse, specular_share};
 use crate::error::Result;
 use crate::math::{Frame, Rgb, Vec2, Vec3, fresnel, luminance, vec3, warp};
 use crate::scene::Surface;
@@ -74,21 +74,16 @@ impl Phong {
 
 impl Bsdf for Phong {
     fn sample(&self, surface: &Surface, wi: Vec3, lobe: f32, u: Vec2) -> Option<BsdfSample> {
-        if wi.z <= 0.0 {
-            return None;
-        }
-        let wo = if lobe < self.pair.specular_share {
+        let wo = specular_or_diffuse(wi, (lobe, self.pair.specular_share), u, || {
             let cos = u.y.powf(1.0 / (self.exponent(surface) + 1.0));
             let (sin, (y, x)) = ((1.0 - cos * cos).max(0.0).sqrt(), (TAU * u.x).sin_cos());
             Frame::around(fresnel::reflect(wi)).to_world(vec3(x * sin, y * sin, cos))
-        } else {
-            warp::cosine_hemisphere(u)
-        };
+        })?;
         self.eval(surface, wi, wo).sampled(wo)
     }
 
     fn eval(&self, surface: &Surface, wi: Vec3, wo: Vec3) -> Eval {
-        if wi.z <= 0.0 || wo.z <= 0.0 {
+        if !are_above(wi, wo) {
             return Eval::default();
         }
         let n = self.exponent(surface);

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use super::ior::{POLYPROPYLENE, relative_ior};
 use super::microfacet::{Kind, Microfacet};
-use super::{Bsdf, BsdfSample, Eval, specular_share};
+use super::{Bsdf, BsdfSample, Eval, are_above, specular_or_diffuse, specular_share};
 use crate::error::Result;
 use crate::math::{Rgb, Vec2, Vec3, fresnel, vec2, warp};
 use crate::scene::Surface;
@@ -42,19 +42,13 @@ struct Pplastic {
 
 impl Bsdf for Pplastic {
     fn sample(&self, surface: &Surface, wi: Vec3, lobe: f32, u: Vec2) -> Option<BsdfSample> {
-        if wi.z <= 0.0 {
-            return None;
-        }
-        let wo = if lobe < self.specular_share {
-            fresnel::reflect_about(wi, self.facets.sample_visible(wi, u))
-        } else {
-            warp::cosine_hemisphere(u)
-        };
+        let visible = || fresnel::reflect_about(wi, self.facets.sample_visible(wi, u));
+        let wo = specular_or_diffuse(wi, (lobe, self.specular_share), u, visible)?;
         self.eval(surface, wi, wo).sampled(wo)
     }
 
     fn eval(&self, surface: &Surface, wi: Vec3, wo: Vec3) -> Eval {
-        if wi.z <= 0.0 || wo.z <= 0.0 {
+        if !are_above(wi, wo) {
             return Eval::default();
         }
         let reflectance = |cos: f32| fresnel::dielectric(cos, self.eta).reflectance;

@@ -5,9 +5,9 @@ use std::f32::consts::{PI, TAU};
 use std::sync::Arc;
 
 use super::phong::Pair;
-use super::{Bsdf, BsdfSample, Eval};
+use super::{Bsdf, BsdfSample, Eval, are_above, specular_or_diffuse};
 use crate::error::Result;
-use crate::math::{Rgb, Vec2, Vec3, vec3, warp};
+use crate::math::{Rgb, Vec2, Vec3, vec3};
 use crate::scene::Surface;
 use crate::scene::plugin::{Loader, Object, Plugin};
 use crate::scene::texture::Texture;
@@ -54,24 +54,19 @@ impl Ward {
 
 impl Bsdf for Ward {
     fn sample(&self, surface: &Surface, wi: Vec3, lobe: f32, u: Vec2) -> Option<BsdfSample> {
-        if wi.z <= 0.0 {
-            return None;
-        }
-        let wo = if lobe < self.pair.specular_share {
+        let wo = specular_or_diffuse(wi, (lobe, self.pair.specular_share), u, || {
             let [au, av] = self.alpha(surface);
             let (sin, cos) = (TAU * u.y).sin_cos();
             // The half vector's slope: both axes stretched by their roughness.
             let length = (-(1.0 - u.x).max(f32::MIN_POSITIVE).ln()).sqrt();
             let h = vec3(au * length * cos, av * length * sin, 1.0).normalize();
             h * (2.0 * wi.dot(h)) - wi
-        } else {
-            warp::cosine_hemisphere(u)
-        };
+        })?;
         self.eval(surface, wi, wo).sampled(wo)
     }
 
     fn eval(&self, surface: &Surface, wi: Vec3, wo: Vec3) -> Eval {
-        if wi.z <= 0.0 || wo.z <= 0.0 {
+        if !are_above(wi, wo) {
             return Eval::default();
         }
         let [au, av] = self.alpha(surface);

@@ -44,7 +44,7 @@ impl<const N: usize> Parameter<N> for Lanes3<N> {
 impl<const N: usize> Parameter<N> for Facets<N> {
     const SLOTS: usize = 2;
 
-    /// The sign of the first roughness tells the distribution.
+    /// The sign of the first roughness stands for the distribution.
     #[inline(always)]
     fn load(from: &[Lanes<N>]) -> Self {
         Self { ggx: from[0].less(Lanes::ZERO), alpha: [from[0].abs(), from[1]] }

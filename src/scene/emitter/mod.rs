@@ -30,8 +30,10 @@ pub trait Emitter: Send + Sync {
     /// Samples a point that may light `from`. The scene sets its emitter index.
     fn sample(&self, from: Vec3, u: Vec2) -> Option<LightPoint>;
 
-    /// Density of [`Emitter::sample`] per solid angle at `from`; for an only point, over its area taken as one.
-    fn pdf(&self, from: Vec3, point: &LightPoint) -> f32;
+    /// Density of [`Emitter::sample`] per solid angle at `from`. By default that of emitters of one point, whose area is taken as one.
+    fn pdf(&self, from: Vec3, point: &LightPoint) -> f32 {
+        point.area_to_solid_angle(from, 1.0)
+    }
 
     /// Radiance sent by `point` along `direction`, which points away from the emitter.
     fn radiance(&self, point: &LightPoint, direction: Vec3) -> Rgb;

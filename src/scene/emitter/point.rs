@@ -32,10 +32,6 @@ impl Emitter for Point {
         Some(LightPoint::only(Position::Point { p: self.position }))
     }
 
-    fn pdf(&self, from: Vec3, point: &LightPoint) -> f32 {
-        point.area_to_solid_angle(from, 1.0)
-    }
-
     fn radiance(&self, _point: &LightPoint, _direction: Vec3) -> Rgb {
         self.intensity
     }

@@ -45,10 +45,6 @@ impl Emitter for Projector {
         Some(self.apex.point())
     }
 
-    fn pdf(&self, from: Vec3, point: &LightPoint) -> f32 {
-        point.area_to_solid_angle(from, 1.0)
-    }
-
     /// Power per solid angle.
     fn radiance(&self, _point: &LightPoint, direction: Vec3) -> Rgb {
         let local = self.apex.local(direction);

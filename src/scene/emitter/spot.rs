@@ -49,10 +49,6 @@ impl Emitter for Spot {
         Some(self.apex.point())
     }
 
-    fn pdf(&self, from: Vec3, point: &LightPoint) -> f32 {
-        point.area_to_solid_angle(from, 1.0)
-    }
-
     fn radiance(&self, _point: &LightPoint, direction: Vec3) -> Rgb {
         let local = self.apex.local(direction);
         let angle = local.z.clamp(-1.0, 1.0).acos();

@@ -6,7 +6,7 @@ use super::smooth;
 use crate::error::{Result, SourceLoc};
 use crate::scene::plugin::{Loader, Object, Plugin};
 
-/// `obj`: texture coordinates count from the bottom, so they are turned over unless told otherwise.
+/// `obj`: texture coordinates count from the bottom, so they are turned over by default.
 pub const OBJ: Plugin<Geometry> = Plugin {
     name: "obj",
     parameters: "filename, to_world, face_normals = false, flip_normals = false, flip_tex_coords = true, \
