@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 """Checks that two builds of fluxion make the same bits: every method on the bundled scenes, rendered straight and
-adaptively, and reconstructed from layers and from a checkpoint.
+adaptively, and reconstructed from layers and from a checkpoint; chosen neighbours, light groups, and jobs of one round and two.
 
-    tools/bit_equality.py OLD_FLUXION NEW_FLUXION [--scenes NAME...] [--methods NAME...] [--spp 8] [--size 48x36]
+    tools/bit_equality.py OLD_FLUXION NEW_FLUXION [--scenes NAME...] [--methods NAME...] [--spp 8] [--size 48x36] [--python]
 
-Prints a line for every comparison and exits with 1 if any channel that both builds write differs. Channels that only one
+With --python the module `fluxion` of this interpreter has to make the new program's bits, too. Prints a line for every comparison and exits with 1 if any channel that both builds write differs. Channels that only one
 of them writes are listed. Header attributes are not compared, since they hold times.
 """
 import argparse
@@ -21,9 +21,10 @@ METHODS = [
     "primal", "l2", "l1", "control_variate", "control_variate:weights=uniform", "control_variate:cross=on",
     "least_trimmed", "least_trimmed:norm=l2", "nlm", "rdfc", "nfor", "frgr", "frgr:form=paper", "frgr:form=code",
     "frgr:enhance=off", "feature", "feature:variances=draws,screen=0,prefilter=nlm", "feature:ambient=0.01", "apr",
+    "gradnet", "net", "net:image=safe", "net:image=network", "net:image=filtered", "frgr:denoiser=net", "blend",
 ]
 # Methods that estimate their error; the others allocate by variances.
-ESTIMATES = ("primal", "frgr", "feature", "apr", "nfor", "rdfc")
+ESTIMATES = ("primal", "frgr", "feature", "apr", "nfor", "rdfc", "gradnet", "net", "blend")
 
 
 def hashes(path):
@@ -60,7 +61,36 @@ def runs(fluxion, scene, folder, arguments):
         allocator = "predicted_error" if method.split(":")[0] in ESTIMATES else "variance"
         run(f"{method} adaptive", "render", scene, *common, "--spp", 2 * arguments.spp, "--method", method, "--adaptive",
             allocator)
+    for kernel, method in [("structure", "l2"), ("learned", "control_variate:weights=given")]:
+        run(f"kernel {kernel}", "render", scene, *common, "--spp", 16, "--method", method, "--kernel", kernel)
+    run("light groups", "render", scene, *common, "--spp", arguments.spp, "--light-groups", "all")
+    for name, rounds in [("job", []), ("job of two rounds", ["--adaptive", "variance"])]:
+        folder_of_job = folder / name
+        seed, others = ["--seed", "5"], [word for word in common if word not in ("--seed", "5")]
+        steps = [["plan", scene, "--spp", "32", "--chunks", "3", *seed, *rounds, "-o", folder_of_job, "--", *others,
+                  "--method", "l2"]]
+        steps += [["run", folder_of_job, str(chunk)] for chunk in ([0] if rounds else [0, 1, 2])]
+        steps += [["allocate", folder_of_job], ["run", folder_of_job, "1"], ["run", folder_of_job, "2"]] if rounds else []
+        for step in [*steps, ["merge", folder_of_job]]:
+            subprocess.run([fluxion, "job", *map(str, step)], check=True, stdout=subprocess.DEVNULL,
+                           stderr=subprocess.DEVNULL)
+        files[name] = folder_of_job / f"{scene.parent.name}.exr"
     return files
+
+
+def by_python(fluxion, scene, folder, arguments):
+    """Images of the module and of the program."""
+    import fluxion as module
+
+    size, differing = tuple(map(int, arguments.size.split("x"))), 0
+    for k, keywords in enumerate([{}, {"method": "frgr"}, {"method": "apr", "adaptive": "variance"}]):
+        options = [word for name, value in keywords.items() for word in (f"--{name}", value)]
+        image = folder / f"python{k}.exr"
+        subprocess.run([fluxion, "render", scene, "--size", arguments.size, "--spp", "16", "-q", *options, "-o", image],
+                       check=True, stderr=subprocess.DEVNULL)
+        mine = module.render(scene, size=size, spp=16, **keywords).image
+        differing += not (mine == module.read_image(image)).all()
+    return differing
 
 
 def main():
@@ -71,6 +101,7 @@ def main():
     parser.add_argument("--methods", nargs="+", default=METHODS, metavar="NAME")
     parser.add_argument("--spp", type=int, default=8)
     parser.add_argument("--size", default="48x36")
+    parser.add_argument("--python", action="store_true")
     arguments = parser.parse_args()
     compared = differing = 0
     for name in arguments.scenes:
@@ -85,6 +116,11 @@ def main():
                 if wrong or alone:
                     print(f"{name}, {what}: {'differs in ' + ' '.join(wrong[:6]) if wrong else 'equal'}"
                           f"{', only one has ' + ' '.join(alone) if alone else ''}", flush=True)
+            if arguments.python:
+                wrong = by_python(arguments.new, scenes()[name], pathlib.Path(second), arguments)
+                compared, differing = compared + 3, differing + wrong
+                if wrong:
+                    print(f"{name}: {wrong} images of the module differ", flush=True)
         print(f"{name}: done", flush=True)
     print(f"{compared} files compared, {differing} differ")
     return 1 if differing else 0
