@@ -22,7 +22,7 @@ pub fn names() -> impl Iterator<Item = PossibleValue> {
 impl clap::Args for Args {
     fn augment_args(command: Command) -> Command {
         rows().fold(command, |command, row| {
-            let help = format!("Record {} in the layers, or in the checkpoint", row.help);
+            let help = format!("Record in the layers or in the checkpoint: {}", row.help);
             command.arg(Arg::new(row.name).long(row.name).help(help).action(ArgAction::SetTrue).requires("recorded"))
         })
     }

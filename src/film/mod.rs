@@ -13,6 +13,7 @@ pub mod exr;
 mod frame;
 mod joined;
 pub mod layer;
+mod layer_lookup;
 mod light_layers;
 mod needs;
 mod neighbours;

@@ -69,7 +69,7 @@ impl RecordedInfo {
 }
 
 /// Every statistic that can be asked for, in the order of [`Recorded`].
-pub const RECORDED: [RecordedInfo; 6] = [
+pub const RECORDED: &[RecordedInfo] = &[
     row(Recorded::Features, "features", Asker::Layers, "albedo, normal and depth").of_surfaces(),
     row(
         Recorded::Bins,
@@ -155,7 +155,7 @@ pub(super) enum Record {
 pub(super) const LIGHT: usize = 6;
 
 /// Every statistic, in the order of [`Record`] and of checkpoint files: new ones come last.
-pub(super) const STATISTICS: [Statistic; 12] = [
+pub(super) const STATISTICS: &[Statistic] = &[
     Statistic::moments(3, |slot, taken| slot.add(taken.sample.color.to_array())),
     Statistic::moments(3, |slot, taken| slot.add(taken.sample.direct.to_array()))
         .sparse(|sample| sample.direct != Rgb::ZERO),
@@ -232,6 +232,7 @@ mod tests {
             (Record::Alpha, 1),
             (Record::Lights, LIGHT),
         ];
+        assert_eq!(names.len(), STATISTICS.len());
         for (k, (record, values)) in names.into_iter().enumerate() {
             assert_eq!((record as usize, record.statistic().values), (k, values));
         }
@@ -242,6 +243,9 @@ mod tests {
             assert!(own.is_some_and(|own| [0, own.values].contains(&row.values)), "{} is of other values", row.name);
         }
         assert!(STATISTICS.is_sorted_by_key(|statistic| statistic.since), "new statistics come last");
-        assert_eq!((Recorded::Alpha.offset(), VALUES, NEWEST), (4, 5, 5));
+        let after = |row: &RecordedInfo| row.id.offset() + row.values;
+        assert!(RECORDED.windows(2).all(|rows| after(&rows[0]) == rows[1].id.offset()));
+        assert_eq!(RECORDED.last().map(after), Some(VALUES));
+        assert_eq!(STATISTICS.last().map(|statistic| statistic.since), Some(NEWEST));
     }
 }

@@ -40,7 +40,7 @@ impl Tile {
         let pixels = width * height;
         let edge_counts = vec![0; if needs.edges.is_sampled() { pixels } else { 0 }];
         let (counts, rejected, half_edges) = (vec![0; pixels], Vec::new(), Vec::new());
-        let planes = STATISTICS.each_ref().map(|_| Vec::new());
+        let planes = [const { Vec::new() }; STATISTICS.len()];
         let lights = usize::from(needs.lights);
         let mut tile = Self { x, y, width, height, lights, counts, edge_counts, rejected, half_edges, planes };
         for (k, statistic) in STATISTICS.iter().enumerate() {

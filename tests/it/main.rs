@@ -31,6 +31,7 @@ mod methods;
 mod nn;
 mod oidn;
 mod outputs;
+mod pipeline;
 mod processors;
 mod report;
 mod samples;

@@ -8,6 +8,7 @@ use std::process::ExitCode;
 
 use anyhow::Result;
 use clap::Subcommand;
+use fluxion::internals::ffi::memory::say_what_is_kept;
 use fluxion::job::{ChunkEnd, Job};
 
 use super::host::hosted;
@@ -65,6 +66,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
 
 fn render(folder: &Path, number: usize) -> Result<ExitCode> {
     let job = Job::load(folder)?;
+    let part = job.unfinished(number);
+    say_what_is_kept(format!("; the last checkpoint, if there was time for one, is kept in {}", part.display()));
     let (chunk, stats, what) = match hosted(&[], |_| true, |host| job.run(number, host))?? {
         ChunkEnd::Complete => {
             note!("chunk {number} is complete");
