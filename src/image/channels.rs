@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use super::io::{ImageFile, OpenImage, Storage};
 use crate::error::{Error, Result};
 use crate::math::{Rgb, srgb_decode, vec3};
+use crate::pixels::{OpenImage, Storage};
 
 /// How the samples of a channel become linear numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -74,7 +74,7 @@ const ALONE: &[&str] = &["y", "l", "i", "grey", "gray", "luminance", "r", "a"];
 impl ColorChannels {
     /// The colours of a file: R, G and B, or X, Y and Z, or grey, with or without alpha; if all its channels belong to one
     /// layer, that layer's.
-    pub fn of(file: &ImageFile, path: &Path, integers: Integers) -> Result<Self> {
+    pub fn of(file: &impl OpenImage, path: &Path, integers: Integers) -> Result<Self> {
         let (order, is_xyz) = choose(&file.channels).ok_or_else(|| {
             let names = file.channels.join(", ");
             Error::io(
@@ -91,7 +91,7 @@ impl ColorChannels {
     }
 
     /// A single channel by its name, as grey. Alpha is linear in every file.
-    pub fn single(file: &ImageFile, path: &Path, name: &str, integers: Integers) -> Result<Self> {
+    pub fn single(file: &impl OpenImage, path: &Path, name: &str, integers: Integers) -> Result<Self> {
         let wanted = name.to_lowercase();
         let fits = |other: &String| {
             let other = other.to_lowercase();
@@ -107,7 +107,7 @@ impl ColorChannels {
     }
 
     /// Channel of the alpha that belongs to the colours, if there is one.
-    pub fn alpha(&self, file: &ImageFile) -> Option<usize> {
+    pub fn alpha(&self, file: &impl OpenImage) -> Option<usize> {
         let layer = |name: &str| name.rsplit_once('.').map_or(String::new(), |(layer, _)| layer.to_lowercase());
         let own = layer(&file.channels[self.order[0]]);
         let is_alpha = |name: &String| name.rsplit('.').next().is_some_and(|part| part.eq_ignore_ascii_case("a"));
@@ -123,13 +123,13 @@ impl ColorChannels {
     }
 
     /// Whether each channel is eight bits of sRGB or of plain numbers, for tables of all values.
-    pub fn is_eight_bit(&self, file: &ImageFile) -> bool {
+    pub fn is_eight_bit(&self, file: &impl OpenImage) -> bool {
         let simple = |decoding: &Decoding| *decoding == self.decoding[0] && !matches!(decoding, Decoding::Gamma(_));
         file.is_eight_bit() && self.to_rec709.is_none() && self.decoding.iter().all(simple)
     }
 }
 
-fn decoding(file: &ImageFile, channel: usize, integers: Integers) -> Decoding {
+fn decoding(file: &impl OpenImage, channel: usize, integers: Integers) -> Decoding {
     match file.storage[channel] {
         Storage::Unsigned(_) if file.format == "openexr" => Decoding::Integer,
         Storage::Unsigned(_) => match integers {

@@ -20,7 +20,7 @@ use std::sync::OnceLock;
 use self::features::Evidence;
 use self::network::Network;
 use super::common::inputs::{Inputs, NET_BYTES, check_memory};
-use super::frgr::{Frgr, NearOidn, Outcome};
+use super::frgr::{Denoiser, Frgr, Near, Outcome};
 use super::net::{self, Corrected, Net};
 use super::{Context, EdgeTrust, Method, Note, Parameter, Parameters, Reconstruction, Solution, Traits};
 use crate::error::{Error, Result};
@@ -64,24 +64,9 @@ const BEST: usize = 2;
 /// Number of candidates: the first method's image and the image that it is near, those of `net` and `frgr`, and the sampled colours.
 const COUNT: usize = 5;
 
-/// A method that enhances an image of another one, and gives both.
-trait Enhancer: Send + Sync {
-    fn needs(&self) -> Needs;
-    fn run(&self, frame: &Frame, context: &Context) -> Result<Outcome>;
-}
-
-impl Enhancer for NearOidn {
-    fn needs(&self) -> Needs {
-        Reconstruction::needs(self)
-    }
-
-    fn run(&self, frame: &Frame, context: &Context) -> Result<Outcome> {
-        Self::run(self, frame, context)
-    }
-}
-
 struct Blend {
-    enhancer: Box<dyn Enhancer>,
+    /// Enhances an image of another method.
+    near: Near,
     net: Net,
     network: &'static Network,
     safety: bool,
@@ -90,17 +75,17 @@ struct Blend {
 fn make(parameters: &Parameters) -> Result<Box<dyn Reconstruction>> {
     let safety = parameters.switch("safety")?;
     if parameters.switch("oidn")? {
-        return Ok(Box::new(Blend::new(Box::new(NearOidn::new(Frgr::default().unfiltered())?), safety)?));
+        return Ok(Box::new(Blend::new(Near::new(Frgr::default().unfiltered(), Denoiser::Oidn)?, safety)?));
     }
     Ok(if safety { Box::new(net::by_default()?) } else { Box::new(Net::new(false)?) })
 }
 
 impl Blend {
-    fn new(enhancer: Box<dyn Enhancer>, safety: bool) -> Result<Self> {
+    fn new(near: Near, safety: bool) -> Result<Self> {
         static NETWORK: OnceLock<Result<Network, String>> = OnceLock::new();
         let network = NETWORK.get_or_init(|| Network::new(WEIGHTS, COUNT));
         let network = network.as_ref().map_err(|why| Error::backend(METHOD.id, why))?;
-        Ok(Self { enhancer, net: Net::new(true)?, network, safety })
+        Ok(Self { near, net: Net::new(true)?, network, safety })
     }
 
     /// The images to be mixed, and the expected squared error of the last method's. `held` bytes besides the images are counted.
@@ -109,7 +94,7 @@ impl Blend {
         let part = |k: f32| move |what: &str, done: f32| (context.progress)(what, 0.45 * (k + done));
         let (first, second) = (part(0.0), part(1.0));
         let Outcome { solution: enhanced, denoised, .. } = context.beside(NOTES * pixels, |memory| {
-            self.enhancer.run(frame, &Context { progress: &first, memory, notes: false })
+            self.near.run(frame, &Context { progress: &first, memory, notes: false })
         })?;
         let Corrected { image, frgr, error, .. } = context.beside((NOTES + 2 * CANDIDATE) * pixels, |memory| {
             self.net.image(frame, &Context { progress: &second, memory, notes: false })
@@ -120,7 +105,7 @@ impl Blend {
 
 impl Reconstruction for Blend {
     fn needs(&self) -> Needs {
-        self.enhancer.needs().union(self.net.needs())
+        self.near.needs().union(self.net.needs())
     }
 
     fn estimates_error(&self) -> bool {
@@ -185,20 +170,9 @@ mod tests {
     const SIZE: (usize, usize) = (48, 40);
 
     /// As with Open Image Denoise, whose place non-local means take.
-    struct StandIn(Frgr);
-
-    impl Enhancer for StandIn {
-        fn needs(&self) -> Needs {
-            self.0.needs()
-        }
-
-        fn run(&self, frame: &Frame, context: &Context) -> Result<Outcome> {
-            self.0.run(&self.0.begin(frame, context)?, context)
-        }
-    }
-
     fn stand_in(safety: bool) -> Blend {
-        Blend::new(Box::new(StandIn(Frgr::default().unfiltered())), safety).unwrap()
+        let near = Near::new(Frgr::default().unfiltered(), Denoiser::Means).unwrap();
+        Blend::new(near, safety).unwrap()
     }
 
     fn frame(truth: &Image, noise: f32, edge: f32, seed: u64) -> Frame {

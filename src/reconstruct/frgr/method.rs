@@ -3,7 +3,6 @@
 use super::{Frgr, HELD_BYTES, Kind, Outcome};
 use crate::error::Result;
 use crate::film::{Frame, Layer, Needs, Recorded};
-use crate::image::Image;
 use crate::reconstruct::common::inputs::NET_BYTES;
 use crate::reconstruct::net::Net;
 use crate::reconstruct::oidn::{self, Features, Quality};
@@ -60,78 +59,65 @@ fn make(parameters: &Parameters) -> Result<Box<dyn Reconstruction>> {
         enhance: parameters.switch("enhance")?,
         filtered,
     };
-    Ok(match parameters.choice("denoiser", &["rdfc", "oidn", "net"])?.as_ref() {
-        "oidn" => Box::new(NearOidn::new(frgr)?),
-        "net" => Box::new(NearNet { frgr, net: Net::new(true)? }),
-        _ => Box::new(frgr),
-    })
+    let denoiser = match parameters.choice("denoiser", &["rdfc", "oidn", "net"])?.as_ref() {
+        "oidn" => Denoiser::Oidn,
+        "net" => Denoiser::Net(Net::new(true)?),
+        _ => Denoiser::Means,
+    };
+    Ok(Box::new(Near::new(frgr, denoiser)?))
 }
 
-/// The context of the method whose image the result is near.
-fn of_denoiser<T>(context: &Context, pixels: usize, denoise: impl FnOnce(&Context) -> Result<T>) -> Result<T> {
-    (context.progress)("denoise", 0.1);
-    let report = |_: &str, share: f32| (context.progress)("denoise", 0.1 + 0.35 * share);
-    context.beside(HELD_BYTES * pixels as u64, |memory| denoise(&Context { progress: &report, memory, notes: false }))
+/// [`Frgr`] near an image of a choice of denoisers.
+pub struct Near {
+    frgr: Frgr,
+    denoiser: Denoiser,
 }
 
-/// [`Frgr`] near the image of Open Image Denoise.
-pub struct NearOidn(Frgr);
+/// The method whose image the result is near.
+pub enum Denoiser {
+    /// Non-local means.
+    Means,
+    /// Open Image Denoise.
+    Oidn,
+    /// Trained networks.
+    Net(Net),
+}
 
-impl NearOidn {
-    /// Fails if Open Image Denoise is not there.
-    pub fn new(frgr: Frgr) -> Result<Self> {
-        oidn::check()?;
-        Ok(Self(frgr))
+impl Near {
+    /// Fails if the denoiser has to be installed and is not.
+    pub fn new(frgr: Frgr, denoiser: Denoiser) -> Result<Self> {
+        if let Denoiser::Oidn = denoiser {
+            oidn::check()?;
+        }
+        Ok(Self { frgr, denoiser })
     }
 
     /// Filters, and gives the images on the way, too.
     pub fn run(&self, frame: &Frame, context: &Context) -> Result<Outcome> {
-        let base = self.0.begin(frame, context)?;
-        self.0.rows(&base, context, 0)?;
-        let networks = (Quality::High, Features::Prefiltered(Quality::Balanced));
-        let clean = |context: &Context| oidn::clean(frame, frame.get(Layer::Direct), networks, context.memory);
-        let image = of_denoiser(context, frame.width * frame.height, clean)?;
-        self.0.near_image(&base, &image, context)
-    }
-}
-
-/// [`Frgr`] near the image of trained networks.
-struct NearNet {
-    frgr: Frgr,
-    net: Net,
-}
-
-impl NearNet {
-    fn run(&self, frame: &Frame, context: &Context) -> Result<Outcome> {
-        let (base, pixels) = (self.frgr.begin(frame, context)?, frame.width * frame.height);
-        self.frgr.rows(&base, context, NET_BYTES * pixels as u64)?;
-        let safe = |context: &Context| self.net.reconstruct(frame, context).map(|solution| solution.image);
-        let image: Image = of_denoiser(context, pixels, safe)?;
+        let base = self.frgr.begin(frame, context)?;
+        let pixels = (frame.width * frame.height) as u64;
+        let report = |_: &str, share: f32| (context.progress)("denoise", 0.1 + 0.35 * share);
+        let image = match &self.denoiser {
+            Denoiser::Means => return self.frgr.run(&base, context),
+            Denoiser::Oidn => {
+                self.frgr.rows(&base, context, 0)?;
+                let networks = (Quality::High, Features::Prefiltered(Quality::Balanced));
+                let direct = frame.get(Layer::Direct);
+                context.beside(HELD_BYTES * pixels, |memory| oidn::clean(frame, direct, networks, memory))?
+            }
+            Denoiser::Net(net) => {
+                self.frgr.rows(&base, context, NET_BYTES * pixels)?;
+                let context_of = |memory| Context { progress: &report, memory, notes: false };
+                context.beside(HELD_BYTES * pixels, |memory| net.image(frame, &context_of(memory)))?.image
+            }
+        };
         self.frgr.near_image(&base, &image, context)
     }
 }
 
-impl Reconstruction for NearOidn {
+impl Reconstruction for Near {
     fn needs(&self) -> Needs {
-        self.0.needs().with(Recorded::Features)
-    }
-
-    fn estimates_error(&self) -> bool {
-        true
-    }
-
-    fn needs_cross(&self) -> bool {
-        true
-    }
-
-    fn reconstruct(&self, frame: &Frame, context: &Context) -> Result<Solution> {
-        Ok(self.run(frame, context)?.solution)
-    }
-}
-
-impl Reconstruction for NearNet {
-    fn needs(&self) -> Needs {
-        self.frgr.needs().with(Recorded::Features)
+        self.frgr.needs().with_if(Recorded::Features, !matches!(self.denoiser, Denoiser::Means))
     }
 
     fn estimates_error(&self) -> bool {

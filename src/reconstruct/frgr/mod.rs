@@ -26,7 +26,7 @@ use self::enhance::{Enhanced, enhance};
 use self::filter::{FilterProblem, Solver, Term};
 use self::form::Form;
 use self::level::Level;
-pub use self::method::{METHOD, NearOidn};
+pub use self::method::{Denoiser, METHOD, Near};
 use self::resample::Resampling;
 use super::common::features::{Feature, Kind};
 use super::common::inputs::Inputs;
