@@ -6,6 +6,7 @@ use std::ffi::{CStr, c_char, c_int, c_uint};
 use std::fs::File;
 use std::io::{self, Write};
 use std::os::fd::{AsRawFd, FromRawFd};
+use std::path::Path;
 use std::sync::OnceLock;
 
 use super::raw::oiio::Shim;
@@ -23,7 +24,7 @@ unsafe extern "C" {
 static LOADED: OnceLock<std::result::Result<Shim, String>> = OnceLock::new();
 
 /// Loads the library from memory, where no file system can forbid it.
-fn load() -> io::Result<Shim> {
+fn from_memory() -> io::Result<Shim> {
     // SAFETY: the name ends in a zero.
     let descriptor = unsafe { memfd_create(NAME.as_ptr(), 0) };
     if descriptor < 0 {
@@ -32,13 +33,24 @@ fn load() -> io::Result<Shim> {
     // SAFETY: the descriptor is a new one, and nobody else's.
     let mut file = unsafe { File::from_raw_fd(descriptor) };
     file.write_all(BYTES)?;
-    let path = format!("/proc/self/fd/{}", file.as_raw_fd());
+    load(Path::new(&format!("/proc/self/fd/{}", file.as_raw_fd())))
+}
+
+/// Loads the library from a temporary file, where there is no `/proc`.
+fn from_file() -> io::Result<Shim> {
+    let mut file = tempfile::NamedTempFile::new()?;
+    file.write_all(BYTES)?;
+    load(file.path())
+}
+
+fn load(path: &Path) -> io::Result<Shim> {
     // SAFETY: what runs when it is loaded is the start of OpenImageIO, as if it were linked.
     unsafe { Shim::new(path) }.map_err(io::Error::other)
 }
 
 fn loaded() -> &'static std::result::Result<Shim, String> {
-    LOADED.get_or_init(|| load().map_err(|error| error.to_string()))
+    let by_file = |first: io::Error| from_file().map_err(|_| first.to_string());
+    LOADED.get_or_init(|| from_memory().or_else(by_file))
 }
 
 /// Fails if the library cannot be loaded.
