@@ -3,7 +3,6 @@
 use std::path::PathBuf;
 
 use fluxion::job::{self, ChunkEnd, Settings};
-use fluxion::pipeline::Checkpoints;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
@@ -34,7 +33,10 @@ impl Job {
         adaptive: Option<String>,
         keywords: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
-        let (Keywords { mut recipe, size, threads, .. }, left) = Keywords::read(keywords)?;
+        let (Keywords { mut recipe, size, threads, checkpoints, checkpoint_every }, left) = Keywords::read(keywords)?;
+        if checkpoints.is_some() {
+            return Err(PyValueError::new_err("chunks have checkpoints of their own"));
+        }
         let Some(spp) = recipe.limits.spp.take() else {
             return Err(PyValueError::new_err("a job takes spp: samples per pixel"));
         };
@@ -45,11 +47,11 @@ impl Job {
         left.into_iter().try_for_each(|(name, value)| others.set_item(name, value))?;
         recipe.scene = options(Some(&others))?;
         recipe.scene.size = size;
-        let job = work::run(py, threads, None, move |_| {
+        let job = work::run(py, threads, None, move |link| {
             let (folder, adaptive) = (folder.as_path(), adaptive.as_deref());
-            let (scenes, recipe, checkpoint_every) = (&scenes[..], &recipe, Checkpoints::EVERY);
-            let job =
-                job::Job::new(&Settings { folder, scenes, frames, spp, chunks, adaptive, recipe, checkpoint_every })?;
+            let (scenes, recipe) = (&scenes[..], &recipe);
+            let settings = Settings { folder, scenes, frames, spp, chunks, adaptive, recipe, checkpoint_every };
+            let job = link.hosted(|host| job::Job::new(&settings, &|text| (host.warn)(text)))?;
             job.create(&[])?;
             Ok(job)
         })?;

@@ -19,6 +19,8 @@ pub struct Keywords {
     pub threads: usize,
     /// Checkpoints, if they are asked for.
     pub checkpoints: Option<Checkpoints>,
+    /// Time between checkpoints.
+    pub checkpoint_every: Duration,
 }
 
 fn wrong<T>(what: &str) -> PyResult<T> {
@@ -39,14 +41,20 @@ pub type Others<'py> = Vec<(String, Bound<'py, PyAny>)>;
 impl Keywords {
     /// Reads the keywords that belong to a recipe; the others are left, by their names, in the order that they were given.
     pub fn read<'py>(keywords: Option<&Bound<'py, PyDict>>) -> PyResult<(Self, Others<'py>)> {
-        let mut read = Self { recipe: Recipe::default(), size: None, threads: 0, checkpoints: None };
-        let (mut checkpoint, mut every, mut resume) = (None::<PathBuf>, Checkpoints::EVERY, false);
+        let mut read = Self {
+            recipe: Recipe::default(),
+            size: None,
+            threads: 0,
+            checkpoints: None,
+            checkpoint_every: Checkpoints::EVERY,
+        };
+        let (mut checkpoint, mut resume) = (None::<PathBuf>, false);
         let mut left = Vec::new();
         for (name, value) in keywords.into_iter().flatten() {
             let name: String = name.extract()?;
             match name.as_str() {
                 "checkpoint" => checkpoint = value.extract()?,
-                "checkpoint_every" => every = duration(&value, &name)?,
+                "checkpoint_every" => read.checkpoint_every = duration(&value, &name)?,
                 "resume" => resume = value.extract()?,
                 "size" => read.size = value.extract()?,
                 "threads" => read.threads = value.extract()?,
@@ -57,6 +65,7 @@ impl Keywords {
         if let (None, true) = (&checkpoint, resume) {
             return wrong("resume takes a checkpoint");
         }
+        let every = read.checkpoint_every;
         read.checkpoints = checkpoint.map(|file| Checkpoints { file, every, resume });
         let Limits { spp, time, .. } = read.recipe.limits;
         if spp.is_some() && time.is_some() {

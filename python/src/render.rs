@@ -3,11 +3,13 @@
 use std::sync::{Arc, Mutex};
 
 use fluxion::adaptive::Start;
+use fluxion::internals::files::claim;
 use fluxion::pipeline::{Host, Prepared};
-use pyo3::exceptions::PyTypeError;
+use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+use crate::error::raised;
 use crate::frame::Frame;
 use crate::recipe::Keywords;
 use crate::reconstruct::{Solution, Solved};
@@ -57,7 +59,10 @@ impl Done {
     /// Renders from a start on, and writes the files that are asked for.
     fn new(prepared: &Prepared, start: Start, host: &Host) -> fluxion::Result<Self> {
         let mut rendered = prepared.run(start, host)?;
-        prepared.write(&mut rendered)?;
+        if let Err(error) = prepared.write(&mut rendered) {
+            // The image is not lost with a file.
+            (host.warn)(&error.to_string());
+        }
         let plan = rendered.stats.plan;
         let (spp, seconds) = (rendered.render.film.mean_spp(), rendered.render.elapsed.as_secs_f64());
         let solution = match rendered.solution {
@@ -90,12 +95,16 @@ pub fn render(
     progress: Option<&Bound<'_, PyAny>>,
     keywords: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<Py<Rendering>> {
-    let (Keywords { mut recipe, size, threads, checkpoints }, left) = Keywords::read(keywords)?;
+    let (Keywords { mut recipe, size, threads, checkpoints, .. }, left) = Keywords::read(keywords)?;
     if let Some((name, _)) = left.first() {
         return Err(PyTypeError::new_err(format!("render() has no keyword argument '{name}'")));
     }
     recipe.outputs.image = true;
-    recipe.check().map_err(crate::error::raised)?;
+    recipe.check().map_err(raised)?;
+    if checkpoints.is_some() && recipe.outputs.samples.is_some() {
+        return Err(PyValueError::new_err("samples cannot be resumed: give either samples or checkpoint"));
+    }
+    recipe.outputs.cryptomatte.iter().try_for_each(|path| claim(path)).map_err(raised)?;
     let (scene, path) = scene.scene(py, size)?;
     let done = work::run(py, threads, progress, move |link| {
         let prepared = recipe.prepare(&scene, &path)?;

@@ -104,8 +104,9 @@ pub fn run<T: Send + 'static>(
         let wait = || receiver.lock().unwrap_or_else(PoisonError::into_inner).recv_timeout(PAUSE);
         match py.detach(wait) {
             Ok(done) => {
+                let done = done.map_err(raised)?;
                 link.warn(py)?;
-                return done.map_err(raised);
+                return Ok(done);
             }
             Err(RecvTimeoutError::Timeout) => {
                 let report = |progress: &Bound<'_, PyAny>| progress.call1(link.stage()).map(drop);

@@ -132,7 +132,19 @@ impl<'a> Runner<'a> {
         let salt = budget.to_string().bytes().fold(0, |hash, byte| rng::combine(hash, u64::from(byte)));
         let (seed_of_run, limits) = (rng::combine(seed, salt), self.limits(budget, pilot.finish));
         let prepared = self.prepare(limits, seed_of_run, pilot.finish)?;
-        let rendered = prepared.run_anew(&Host { stop, ..Host::QUIET })?;
+        let host = Host { stop, ..Host::QUIET };
+        let rendered = if self.is_adaptive() {
+            prepared.run_anew(&host)?
+        } else {
+            let empty = RenderOutcome::new(&self.case.scene, prepared.settings.needs);
+            let outcome = prepared.render(empty, None, &host);
+            if outcome.stopped {
+                return Ok(None);
+            }
+            let mut rendered = prepared.develop(outcome, &host);
+            rendered.solution = Some(prepared.method.solve(&rendered.frame, &host, &mut rendered.stats)?);
+            rendered
+        };
         let Rendered { render, solution: Some(Solution { image, .. }), stats, .. } = rendered else { return Ok(None) };
         if render.stopped {
             return Ok(None);

@@ -14,7 +14,7 @@ pub struct Args {
     pub checkpoint: Option<PathBuf>,
     /// Resume from the checkpoint, if it exists
     #[arg(long, requires = "checkpoint")]
-    resume: bool,
+    pub resume: bool,
     /// Time between checkpoints; slow ones are written less often, so that they take at most a hundredth of the time
     #[arg(
         long, default_value = "60s", value_parser = super::parse_time, requires = "checkpoint", value_name = "TIME",

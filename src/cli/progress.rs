@@ -78,6 +78,20 @@ impl Progress {
         }
     }
 
+    /// Begins a stage, with a clock of its own.
+    pub fn restart(&self, stage: &str) {
+        self.drawn.reset();
+        self.set_message(stage);
+        if let Some(lines) = &self.lines {
+            lock(lines).restart();
+        }
+    }
+
+    /// Shows something else while the bar is away.
+    pub fn suspend(&self, show: impl FnOnce()) {
+        self.drawn.suspend(show);
+    }
+
     /// Moves to a share in [0, 1].
     pub fn set(&self, share: f32) {
         let share = share.clamp(0.0, 1.0);
@@ -94,6 +108,11 @@ impl Progress {
 }
 
 impl Lines {
+    fn restart(&mut self) {
+        self.start = Instant::now();
+        self.next = self.start + pause(self.style);
+    }
+
     /// Writes a line, if one is due.
     fn report(&mut self, share: f32) {
         let now = Instant::now();

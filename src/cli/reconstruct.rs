@@ -11,7 +11,7 @@ use fluxion::film::{Frame, Layer, exr};
 use fluxion::pipeline::{Outputs, Stats, peak_bytes};
 use fluxion::reconstruct;
 
-use super::host::hosted;
+use super::host::watched;
 use super::outputs::Claims;
 use super::terminal::note;
 use super::{json, method};
@@ -62,7 +62,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let _claims = Claims::new(&args.output, &[&args.json.file()], &[&args.layers])?;
     let mut stats = of_frame(&frame, &method.name);
     stats.seconds.load = loading.elapsed().as_secs_f64();
-    let solution = hosted(&[], |_| true, |host| method.solve(&frame, host, &mut stats))?;
+    let solution = watched(|host| method.solve(&frame, host, &mut stats));
     let solution = solution.map_err(|error| with_others(error, &frame))?;
     frame.provenance.method.clone_from(&method.name);
     let (images, exposure, notes) = (args.output.clone(), args.exposure.exposure, args.method.notes.clone());

@@ -79,11 +79,17 @@ struct Known {
     epoch: u32,
 }
 
+/// Fails if a folder has a job already.
+fn check_folder(folder: &Path) -> Result<()> {
+    let what = || format!("{} has a job already: take another folder", folder.display());
+    if folder.join(FILE).exists() { Err(Error::Usage(what())) } else { Ok(()) }
+}
+
 /// Fails if a recipe is not one of a chunk, whose film is merged with others and has the samples that its plan says.
 fn check(recipe: &Recipe) -> Result<()> {
     let refused = |what: String| Err(Error::Usage(what));
     let Recipe { limits, allocator, goals, kernel, outputs, .. } = recipe;
-    if allocator.is_some() || limits.error.is_some() || goals.is_some() {
+    if allocator.is_some() || limits.error.is_some() || limits.time.is_some() || goals.is_some() {
         let what = "chunks cannot say how many samples they take: give --adaptive before the --, and neither --target-error nor --goals";
         return refused(what.into());
     }
@@ -136,9 +142,10 @@ impl FirstRound {
 }
 
 impl Job {
-    /// A job of so many chunks an image. Chunks are of multiples of eight samples, so that bins stay whole. The scenes of all images
+    /// A job in chunks. Chunks are of multiples of eight samples, so that bins stay whole. The scenes of all images
     /// are loaded: what is wrong with them, or with the options, is found out before any machine works.
-    pub fn new(settings: &Settings) -> Result<Self> {
+    pub fn new(settings: &Settings, warn: &dyn Fn(&str)) -> Result<Self> {
+        check_folder(settings.folder)?;
         let Settings { frames, spp, chunks: parts, checkpoint_every, .. } = *settings;
         let most = spp.div_ceil(BINS as u32);
         if parts > most {
@@ -175,6 +182,7 @@ impl Job {
             let (recipe, file) = (job.recipe(&chunk), job.image(image).0);
             let scene = recipe.load(file)?;
             let prepared = recipe.prepare(&scene, file)?;
+            scene.warnings().iter().chain(&prepared.warnings).for_each(|warning| warn(warning));
             if let Some(first) = &job.adaptive {
                 adaptive::check(&*prepared.method.made, first.allocator()?.needs_error())?;
             }
@@ -187,10 +195,7 @@ impl Job {
     /// folder has a job already.
     pub fn create(&self, options: &[String]) -> Result<()> {
         let folder = &self.folder;
-        if folder.join(FILE).exists() {
-            let what = format!("{} has a job already: take another folder", folder.display());
-            return Err(Error::Usage(what));
-        }
+        check_folder(folder)?;
         let failed = |error| Error::io(folder, format!("cannot be made: {error}"));
         std::fs::create_dir_all(folder).map_err(failed)?;
         let absolute = folder.canonicalize().map_err(|error| Error::io(folder, error))?;

@@ -6,6 +6,7 @@ use std::time::Instant;
 use super::chunk::{Chunk, State};
 use super::description::Job;
 use crate::error::{Error, Result};
+use crate::files;
 use crate::pipeline::{Checkpoints, Host, Stats};
 
 /// How the work on a chunk has ended.
@@ -39,7 +40,23 @@ impl Job {
         };
         let checkpoints = Checkpoints { file: part.clone(), every: self.checkpoint_every, resume: true };
         let _lock = checkpoints.lock()?;
-        let (recipe, file, loading) = (self.recipe(&chunk), self.image(chunk.image).0, Instant::now());
+        // A chunk that is being worked on is seen to be started.
+        files::claim(&part)?;
+        let done = self.render(&chunk, &checkpoints, host);
+        if done.is_err() && std::fs::metadata(&part).is_ok_and(|found| found.len() == 0) {
+            // Best effort: an empty file left behind does no harm.
+            let _ = std::fs::remove_file(&part);
+        }
+        let stats = done?;
+        if host.stop.load(Ordering::Relaxed) {
+            return Ok(ChunkEnd::Stopped(chunk, stats));
+        }
+        std::fs::rename(&part, &whole).map_err(|error| Error::io(&whole, error))?;
+        Ok(ChunkEnd::Rendered(chunk, stats))
+    }
+
+    fn render(&self, chunk: &Chunk, checkpoints: &Checkpoints, host: &Host) -> Result<Stats> {
+        let (recipe, file, loading) = (self.recipe(chunk), self.image(chunk.image).0, Instant::now());
         let scene = recipe.load(file)?;
         let load = loading.elapsed().as_secs_f64();
         scene.warnings().iter().for_each(|warning| (host.warn)(warning));
@@ -52,10 +69,6 @@ impl Job {
         let mut stats =
             checkpoints.keep((&prepared, origin), host, |start, host| Ok(prepared.run(start, host)?.stats))?;
         stats.seconds.load = load;
-        if host.stop.load(Ordering::Relaxed) {
-            return Ok(ChunkEnd::Stopped(chunk, stats));
-        }
-        std::fs::rename(&part, &whole).map_err(|error| Error::io(&whole, error))?;
-        Ok(ChunkEnd::Rendered(chunk, stats))
+        Ok(stats)
     }
 }

@@ -61,7 +61,8 @@ pub struct Options {
     /// Whether every ray is kept, to measure the time of tracing alone.
     #[serde(skip)]
     pub log_rays: bool,
-    /// Threads for building (0: all).
+    /// Threads for building (0: as many as work otherwise).
+    #[serde(skip)]
     pub threads: usize,
     /// Bytes of image textures to hold in memory; files beyond them are read tile by tile as they are needed.
     pub texture_memory: u64,
@@ -182,7 +183,7 @@ fn build(path: &Path, tree: xml::Tree, options: &Options, origin: DVec3) -> Resu
         warnings,
     };
     let build = BuildOptions {
-        threads: options.threads,
+        threads: if options.threads == 0 { rayon::current_num_threads() } else { options.threads },
         light_groups: options.light_groups.as_deref(),
         fast_paths: options.fast_paths,
         log_rays: options.log_rays,

@@ -44,6 +44,7 @@ pub struct Prepared<'a> {
 impl Recipe {
     /// Decides about a render of a scene, which was read from `file`. The error says what of the recipe cannot be.
     pub fn prepare<'a>(&self, scene: &'a Scene, file: &Path) -> Result<Prepared<'a>> {
+        self.check()?;
         let method = self.method.make()?;
         let allocator = adaptive::chosen(self.allocator.as_deref(), &self.limits, &*method.made)?;
         let limits = self.limits.or_samples(scene.sensor().spp);

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::method::MethodRecipe;
 use super::output::Outputs;
 use crate::adaptive::{self, Limits};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::film::{Needs, Recorded};
 use crate::mitsuba;
 use crate::neighbours::Selector;
@@ -103,7 +103,17 @@ impl Recipe {
     pub fn check(&self) -> Result<()> {
         let method = self.method.make()?;
         Selector::parse(&self.kernel, self.pilot)?;
-        adaptive::chosen(self.allocator.as_deref(), &self.limits, &*method.made)?;
+        let allocator = adaptive::chosen(self.allocator.as_deref(), &self.limits, &*method.made)?;
+        let decided = allocator.is_some() || self.limits.time.is_some() || self.limits.error.is_some();
+        let even = self.outputs.samples.is_some() || self.goals.is_some();
+        if decided && even {
+            let what =
+                "samples one by one and goals take a number of samples, without an allocator, a time or a target error";
+            return Err(Error::Usage(what.into()));
+        }
+        if self.outputs.samples.is_some() && self.goals.is_some() {
+            return Err(Error::Usage("samples one by one have no goals".into()));
+        }
         Ok(())
     }
 

@@ -12,7 +12,7 @@ use crate::film::{Frame, exr};
 use crate::image::io::failed_lookups;
 use crate::output::samples::SampleWriter;
 use crate::reconstruct::Solution;
-use crate::render::{self, Control, RenderOutcome, RenderSettings, SampleSink};
+use crate::render::{self, Control, RenderOutcome, RenderSettings, SampleId, SampleSink};
 
 /// A render that has ended.
 pub struct Rendered {
@@ -133,6 +133,11 @@ fn warn(outcome: &RenderOutcome, host: &Host) {
     if let Some((path, count)) = failed_lookups() {
         let path = path.display();
         (host.warn)(&format!("{count} lookups in textures that can no longer be read were black, the first in {path}"));
+    }
+    if let Some((SampleId { x, y, index, seed }, reason)) = outcome.first_rejected {
+        let (count, reason) = (outcome.film.rejected(), reason.0);
+        let first = format!("the first is number {index} of pixel {x},{y}, seed {seed}");
+        (host.warn)(&format!("{count} samples were not finite ({reason}) and count as zero; {first}"));
     }
     if outcome.stopped {
         let spp = outcome.film.most_samples();

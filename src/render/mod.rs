@@ -39,7 +39,7 @@ pub use self::schedule::{Budget, RenderSettings, render, render_to_counts, resum
 pub use self::shown::{Shown, ShownShapes, shown_shapes};
 pub use self::wave::Samples;
 
-/// Number of the samples: raised whenever a change of the program changes any bit of any sample. Films of different epochs are not
+/// Number of the samples: raised whenever a change of the program changes any bit of any sample, or a decision of adaptive runs. Films of different epochs are not
 /// of the same samples, so they cannot be resumed or added.
 pub const EPOCH: u32 = 1;
 

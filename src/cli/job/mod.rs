@@ -11,7 +11,7 @@ use clap::Subcommand;
 use fluxion::internals::ffi::memory::say_what_is_kept;
 use fluxion::job::{ChunkEnd, Job};
 
-use super::host::hosted;
+use super::host::{hosted, watched};
 use super::terminal::{note, out};
 use super::{interrupt, progress};
 
@@ -97,7 +97,7 @@ fn allocate(folder: &Path) -> Result<ExitCode> {
 fn merge(folder: &Path, partial: bool, reconstruct: bool) -> Result<ExitCode> {
     let job = Job::load(folder)?;
     for image in 0..job.images() {
-        let merged = hosted(&[], |_| true, |host| job.merge(image, partial, reconstruct, host))??;
+        let merged = watched(|host| job.merge(image, partial, reconstruct, host))?;
         out!("{}: {:.1} samples per pixel of {} chunks", merged.film.display(), merged.spp, merged.chunks)?;
         merged.image.iter().try_for_each(|image| out!("{}", image.display()))?;
     }

@@ -11,6 +11,7 @@ use fluxion::error::Error;
 use fluxion::job::{Job, Settings};
 use fluxion::pipeline::Recipe;
 
+use crate::cli::host::warn;
 use crate::cli::terminal::out;
 use crate::cli::{Args as CliArgs, Command, render};
 
@@ -66,6 +67,9 @@ fn chunks(args: &Args) -> Result<Chunks> {
     let line = said.into_iter().chain(args.options.iter().map(String::as_str));
     match CliArgs::try_parse_from(line) {
         Ok(CliArgs { command: Command::Render(render), machine }) => {
+            if let Some(name) = render.not_of_chunks() {
+                bail!(Error::Usage(format!("{name} has no meaning for the chunks of a job")));
+            }
             let recipe = Recipe { seed: args.seed, ..render.recipe() };
             let limits = Limits { spp: None, ..recipe.limits };
             let (checkpoint_every, machine) = (render.checkpoint_every(), machine.words());
@@ -83,7 +87,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let Args { scenes, frames, spp, chunks, .. } = args;
     let (frames, spp, chunks) = (*frames, *spp, *chunks);
     let settings = Settings { folder, scenes, frames, spp, chunks, adaptive, recipe: &recipe, checkpoint_every };
-    let job = Job::new(&settings)?;
+    let job = Job::new(&settings, &warn)?;
     job.create(&machine)?;
     let second = if job.adaptive.is_some() { ", after `fluxion job allocate` each of commands-2.txt" } else { "" };
     out!("{}: {} chunks; each line of commands.txt renders one{second}", folder.display(), job.chunks())?;

@@ -75,6 +75,17 @@ impl Args {
         }
     }
 
+    /// The first option that is given and that has no meaning for chunks of jobs.
+    pub fn not_of_chunks(&self) -> Option<&'static str> {
+        let given = [
+            ("--display", self.outputs.display.is_some()),
+            ("--replay", self.sampling.replay.is_some()),
+            ("--resume", self.checkpoint.resume),
+            ("--json", self.outputs.json.is_wanted()),
+        ];
+        given.into_iter().find(|(_, given)| *given).map(|(name, _)| name)
+    }
+
     /// Time between checkpoints.
     pub fn checkpoint_every(&self) -> Duration {
         self.checkpoint.checkpoint_every
@@ -121,6 +132,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             Ok(stats)
         }
     })??;
+    args.outputs.json.write(&stats)?;
     report(&stats);
     Ok(ExitCode::SUCCESS)
 }
@@ -141,7 +153,6 @@ fn finish(
     prepared.write(&mut rendered)?;
     let mut stats = rendered.stats;
     stats.peak_bytes = fluxion::pipeline::peak_bytes();
-    args.outputs.json.write(&stats).map_err(|error| Error::NotWritten(format!("{error:#}")))?;
     Ok(stats)
 }
 
@@ -154,9 +165,8 @@ fn viewer(args: &Args, recipe: &Recipe, scene: &Scene) -> Result<Option<Viewer>>
 
 /// Says how to trace the first sample again that was not finite.
 fn tell_rejected(args: &Args, rendered: &Rendered) {
-    let Some((SampleId { x, y, index, seed }, reason)) = rendered.render.first_rejected else { return };
-    let count = rendered.stats.rejected;
-    note!("warning: {count} samples were not finite ({}) and count as zero; replay the first with:", reason.0);
+    let Some((SampleId { x, y, index, seed }, _)) = rendered.render.first_rejected else { return };
+    note!("replay the first sample that was not finite with:");
     let (file, shift, options) = (args.scene.display(), args.differences.as_text(), args.options.as_text());
     note!("  fluxion render {file} --seed {seed}{shift}{options} --replay {x},{y},{index}");
 }

@@ -94,19 +94,18 @@ impl Near {
 
     /// Filters, and gives the images on the way, too.
     pub fn run(&self, frame: &Frame, context: &Context) -> Result<Outcome> {
-        let base = self.frgr.begin(frame, context)?;
         let pixels = (frame.width * frame.height) as u64;
+        let of_denoiser = if let Denoiser::Net(_) = self.denoiser { NET_BYTES * pixels } else { 0 };
+        let base = self.frgr.begin(frame, context, of_denoiser)?;
         let report = |_: &str, share: f32| (context.progress)("denoise", 0.1 + 0.35 * share);
         let image = match &self.denoiser {
             Denoiser::Means => return self.frgr.run(&base, context),
             Denoiser::Oidn => {
-                self.frgr.rows(&base, context, 0)?;
                 let networks = (Quality::High, Features::Prefiltered(Quality::Balanced));
                 let direct = frame.get(Layer::Direct);
                 context.beside(HELD_BYTES * pixels, |memory| oidn::clean(frame, direct, networks, memory))?
             }
             Denoiser::Net(net) => {
-                self.frgr.rows(&base, context, NET_BYTES * pixels)?;
                 let context_of = |memory| Context { progress: &report, memory, notes: false };
                 context.beside(HELD_BYTES * pixels, |memory| net.image(frame, &context_of(memory)))?.image
             }

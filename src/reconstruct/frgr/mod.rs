@@ -71,7 +71,7 @@ impl Default for Frgr {
 
 /// Floats held for every pixel besides the frame while levels are worked on, of the finest level while another method denoises
 /// it, and while a band is denoised: upper bounds; 160 were measured in all.
-const LEVEL_FLOATS: u64 = 170;
+const LEVEL_FLOATS: u64 = 180;
 const HELD_FLOATS: u64 = 40;
 const BAND_FLOATS: u64 = 45;
 
@@ -116,7 +116,7 @@ impl Reconstruction for Frgr {
     }
 
     fn reconstruct(&self, frame: &Frame, context: &Context) -> Result<Solution> {
-        Ok(self.run(&self.begin(frame, context)?, context)?.solution)
+        Ok(self.run(&self.begin(frame, context, 0)?, context)?.solution)
     }
 }
 
@@ -130,17 +130,19 @@ impl Frgr {
         Self { levels: 1, filtered: false, ..self }
     }
 
-    /// Prepares a frame.
-    pub fn begin<'a>(&self, frame: &'a Frame, context: &Context) -> Result<Base<'a>> {
+    /// Prepares a frame. Fails if what is held, and `more` bytes of the method that makes the image to filter near, is not within the bound on
+    /// memory.
+    pub fn begin<'a>(&self, frame: &'a Frame, context: &Context, more: u64) -> Result<Base<'a>> {
         (context.progress)("clean", 0.0);
         let inputs = Inputs::new(frame, 1 << (self.levels - 1))?;
+        rows_beside(&inputs, context, more)?;
         let level = self.prepare(&inputs, frame)?;
         Ok(Base { inputs, level })
     }
 
     /// Filters near the image of non-local means.
     pub fn run(&self, base: &Base, context: &Context) -> Result<Outcome> {
-        let rows = self.rows(base, context, 0)?;
+        let rows = rows_beside(&base.inputs, context, 0)?;
         (context.progress)("denoise", 0.1);
         let report = |share: f32| (context.progress)("denoise", 0.1 + 0.35 * share);
         self.near(base, denoise::by_means(&base.level, self.form, rows, &report), context)
@@ -149,12 +151,6 @@ impl Frgr {
     /// Filters near an image that another method has made of the frame, in radiance.
     pub fn near_image(&self, base: &Base, image: &Image, context: &Context) -> Result<Outcome> {
         self.near(base, denoise::judged(&base.level, &base.inputs, image), context)
-    }
-
-    /// Fails if what is held, and `more` bytes of another method, is not within the bound on memory. Rows that may be denoised at a time.
-    pub fn rows(&self, base: &Base, context: &Context, more: u64) -> Result<usize> {
-        let held = HELD_BYTES * (base.inputs.width * base.inputs.height) as u64;
-        rows(&base.inputs, context.memory, held + more)
     }
 
     /// Filters near a denoised image.
@@ -300,6 +296,11 @@ impl Frgr {
         let (color, variance) = (&level.color, &level.variance);
         FilterProblem { color, variance, penalty: &penalty, terms, radius: self.radius, solver: self.solver }.solve()
     }
+}
+
+/// Rows that may be denoised at a time while `more` bytes are another method's; fails if the bound on memory does not allow that.
+fn rows_beside(inputs: &Inputs, context: &Context, more: u64) -> Result<usize> {
+    rows(inputs, context.memory, HELD_BYTES * (inputs.width * inputs.height) as u64 + more)
 }
 
 /// Rows that are denoised at a time, within a bound on memory, of which the denoiser takes so many bytes.

@@ -141,8 +141,7 @@ impl Reconstruction for Auto {
             return self.net.reconstruct(frame, context);
         }
         let (frgr, pixels) = (&self.net.frgr, (frame.width * frame.height) as u64);
-        let base = frgr.begin(frame, context)?;
-        frgr.rows(&base, context, NET_BYTES * pixels)?;
+        let base = frgr.begin(frame, context, NET_BYTES * pixels)?;
         let report = |_: &str, done: f32| (context.progress)("denoise", 0.1 + 0.35 * done);
         let safe = context.beside(HELD_BYTES * pixels, |memory| {
             self.net.correct(&base, frame, &Context { progress: &report, memory, notes: false })
@@ -187,7 +186,8 @@ impl Net {
 
     /// The corrected image of a frame.
     pub fn image(&self, frame: &Frame, context: &Context) -> Result<Corrected> {
-        self.correct(&self.frgr.begin(frame, context)?, frame, context)
+        check_memory(frame, context, METHOD.id, NET_BYTES)?;
+        self.correct(&self.frgr.begin(frame, context, 0)?, frame, context)
     }
 
     /// The corrected image of a frame that is prepared.
