@@ -28,6 +28,7 @@ check: packages
 	cargo fmt --all --check
 	cargo clippy --profile checked --all-targets -- -D warnings
 	cargo clippy -p fluxion-python -- -D warnings
+	cargo check -p fluxion-fuzz
 	RUSTDOCFLAGS="-D warnings" cargo doc --no-deps
 
 # Licences and sources of all dependencies. Advisories are not looked at here, since that takes an internet connection:
