@@ -2,11 +2,16 @@
 
 # What the build links against, and what the tests and CI call. apt-get names, the same on both releases.
 PACKAGES = g++ pkg-config libclang-dev libembree-dev libopenimageio-dev
-# A test opens the report in it.
-TEST_PACKAGES = chromium
+# A test opens the report in the one, and compares tables with their figures by the other.
+TEST_PACKAGES = chromium python3
 SCENE = scenes/cornell-box/scene.xml
 
-.PHONY: demo test packages check licences wheel deb dist memcheck train-net train-blend train-gradnet train-kernels
+# Folder of public scenes, as NAME/scene.xml, for references and figures; hours that references may take; one figure by name.
+SCENES =
+HOURS = 1
+NAME =
+
+.PHONY: references figures figures-status demo test packages check licences wheel deb dist memcheck train-net train-blend train-gradnet train-kernels
 
 demo: packages
 	cargo build --release
@@ -66,6 +71,25 @@ train-net train-blend train-gradnet train-kernels: packages
 	@sh .ci/packages python3-venv
 	cargo build --release
 	tools/train/train.sh $(@:train-%=%) training
+
+# References that the figures need, in measured/: as good as the hours make them, what is there is continued.
+references: measured/venv/ready
+	cargo build --release
+	measured/venv/bin/python tools/figures references --scenes "$(SCENES)" --hours $(HOURS)
+
+# Measures what is stale, or the figure NAME, and prints the tables of all documents.
+figures: measured/venv/ready
+	cargo build --release
+	measured/venv/bin/python tools/figures run $(NAME) --scenes "$(SCENES)"
+
+figures-status:
+	@python3 tools/figures status
+
+measured/venv/ready: tools/figures/requirements.txt | packages
+	@sh .ci/packages python3-venv libllvm19
+	python3 -m venv measured/venv
+	measured/venv/bin/pip install -q -r tools/figures/requirements.txt
+	touch $@
 
 # Installs what is missing, through sudo when not root. Elsewhere than on Debian it says what is needed.
 packages:

@@ -1,4 +1,4 @@
-//! What rendering costs: `cargo bench --bench render -- SCENE.xml ...`, the table of docs/performance.md.
+//! What rendering costs: `cargo bench --bench render -- SCENE.xml ...`, as docs/design/performance.md explains.
 //!
 //! Per scene, medians of five rounds in which everything that is compared takes its turn: samples a second of paths, the
 //! cost of a sample with gradients in path samples, the share of the time that the same rays take in Embree alone, what a

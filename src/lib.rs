@@ -10,7 +10,7 @@
 //! difference between two pixels, estimated from both of its ends by **shifting** paths. The **film** accumulates
 //! statistics of all samples; developed, it is a **frame** of **layers**: images with names and variances. A **method**
 //! reconstructs an image from a frame, and the **plan** says what need not be computed for it. A **recipe** is everything that
-//! decides a render; [`pipeline`] carries it out. docs/glossary.md has all terms.
+//! decides a render; [`pipeline`] carries it out. docs/design/glossary.md has all terms.
 //!
 //! ```
 //! use fluxion::{Host, Recipe};

@@ -1,4 +1,4 @@
-"""Scenes of one plugin each, beside Mitsuba 3: the ratio of the means of both, as a table of docs/mitsuba-support.md.
+"""Scenes of one plugin each, beside Mitsuba 3: the ratio of the means of both, as docs/design/agreement.md says.
 
     python tools/plugins.py [SPP=1024] [NAME ...]
 

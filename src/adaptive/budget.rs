@@ -31,14 +31,13 @@ impl Limits {
 /// allocate by.
 pub(super) const FIRST_SPP: u32 = 8;
 
-/// Share of a budget that the first, uniform pass takes, and number of passes that follow it. Chosen on the scenes of
-/// docs/adaptive.md, "The loop": with three passes after a quarter of the budget, errors at 48 spp are 0.55 (`apr`) and
-/// 0.62 (`frgr`) of those of even samples.
+/// Share of a budget that the first, uniform pass takes, and number of passes that follow it. docs/figures/adaptive.md has
+/// what they gain.
 pub(super) const FIRST_SHARE: f64 = 0.25;
 pub(super) const PASSES: u32 = 3;
 
 /// Share of the time that reconstructions between passes may take: less than adaptive sampling gains at equal time
-/// (docs/adaptive.md).
+/// (docs/figures/adaptive.md).
 const OVERHEAD: f64 = 0.1;
 
 /// Least and largest growth of the number of samples by a pass on the way to a target error: a pass of less than 15 %
@@ -49,7 +48,7 @@ const GROWTH: (f64, f64) = (0.15, 1.0);
 const CONFIRM: f64 = 1.0;
 
 /// Exponent of the number of samples that errors are assumed to fall with, to predict how many will do; between the
-/// slopes of the methods in docs/results.md, "Error against run time".
+/// slopes of the methods.
 const SLOPE: f64 = 0.85;
 
 /// Share of the last pass after which the speed of rendering is measured again, to meet a time limit.

@@ -8,6 +8,6 @@ mod store;
 
 pub use self::case::{Case, Truth};
 pub use self::cell::{Budget, Pilot, RunResult, Runner};
-pub use self::record::{LeftOut, Record, Results, Seconds, machine};
+pub use self::record::{LeftOut, MEASURES, Record, Results, Seconds, machine};
 pub use self::runs::Runs;
 pub use self::store::Store;

@@ -60,17 +60,22 @@ pub struct Record {
     pub version: String,
 }
 
+/// The four measures of an error, keys of metrics with the names of the errors. All errors are zero for the reference itself.
+pub const MEASURES: [(&str, &str); 4] =
+    [("relmse", "relMSE"), ("smape", "SMAPE"), ("flip", "FLIP"), ("ms_ssim", "1 - MS-SSIM")];
+
 /// The share of a reference's own noise that is still there after it has been taken off: how well the noise is known.
 const KNOWN: f64 = 0.05;
 
 impl Record {
-    /// The error by a metric. The reference's own noise is taken off where it adds to the error, which is of relMSE: with the
+    /// The error by a metric, that by MS-SSIM being what it lacks to one. The reference's own noise is taken off where it adds to the error, which is of relMSE: with the
     /// halves A and B of a reference R this leaves the mean of (I - A)(I - B) / (R² + 0.01), which is without bias. It is at
     /// least 5 % of that noise, below which nothing is known.
     pub fn error(&self, metric: &str) -> Option<f64> {
         let measured = *self.metrics.get(metric)?;
         Some(match self.floor {
             Some(floor) if metric == "relmse" => (measured - floor).max(KNOWN * floor),
+            _ if metric == "ms_ssim" => 1.0 - measured,
             _ => measured,
         })
     }

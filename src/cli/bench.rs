@@ -10,7 +10,7 @@ use fluxion::adaptive;
 use fluxion::bench::{Budget, Case, Results, Runner, Runs, Store, Truth};
 use fluxion::error::Error;
 use fluxion::reconstruct::{self, METHODS};
-use fluxion::report::{Page, Shown, Summary, View, changes, errors, table};
+use fluxion::report::{Page, Shown, View, changes, errors, ratios, scene_errors, summaries};
 
 use super::progress;
 use super::terminal::{note, out};
@@ -94,10 +94,11 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     bar.finish();
     store.save()?;
     write_page(args, &store, &scenes, &budgets, baseline.as_ref())?;
-    let summary = Summary::new(&store.results, "relmse");
-    out!("{}\nrelMSE within the largest budget, without the references' own noise:\n", table(&summary))?;
+    let summaries = summaries(&store.results);
+    out!("{}\nWithin the largest budget; relMSE without the references' own noise:\n", ratios(&summaries))?;
     if let Some(largest) = budgets.iter().max_by(|a, b| a.amount().total_cmp(&b.amount())) {
-        out!("{}", errors(&summary, &largest.to_string()).trim_end())?;
+        let scenes = scene_errors(&store.results, &summaries, &largest.to_string());
+        out!("{}", errors(&scenes).trim_end())?;
     }
     warn_of_floors(&store.results);
     if stop.load(Ordering::Relaxed) {

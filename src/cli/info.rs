@@ -1,11 +1,12 @@
 //! `fluxion info`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use super::terminal::out;
 use anyhow::{Result, bail};
 use fluxion::adaptive::ALLOCATORS;
+use fluxion::bench;
 use fluxion::error::Error;
 use fluxion::film::{Layer, Needs};
 use fluxion::internals::plan::Plan;
@@ -14,6 +15,7 @@ use fluxion::mitsuba;
 use fluxion::mitsuba::integrator;
 use fluxion::neighbours::KERNELS;
 use fluxion::reconstruct::{self, METHODS, Method};
+use fluxion::render::EPOCH;
 use fluxion::scene::plugin::UNSUPPORTED;
 use fluxion::scene::shape::Geometry;
 use fluxion::scene::{Scene, bsdf, emitter, sensor, shape, texture};
@@ -27,6 +29,9 @@ pub struct Args {
     /// Method whose needs the plan is made for
     #[arg(long, default_value = reconstruct::DEFAULT, value_name = "NAME[:KEY=VALUE,...]")]
     method: String,
+    /// Add version, machine and the scene's warnings, without any path, as the report of a wrong picture needs them
+    #[arg(long, requires = "scene")]
+    report: bool,
     /// List the methods with their parameters
     #[arg(long)]
     methods: bool,
@@ -67,7 +72,11 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         Some(path) if super::stored::describe(path)? => {}
         Some(path) => {
             let options = mitsuba::Options { sensor_optional: true, ..args.options.options() };
-            describe(&super::scene::load(path, &options)?, &args.method)?;
+            let scene = super::scene::load(path, &options)?;
+            if args.report {
+                report(&scene, path)?;
+            }
+            describe(&scene, &args.method)?;
         }
         None if !(args.methods || args.kernels || args.layers || args.plugins || args.metrics) => {
             bail!(Error::Usage(
@@ -116,6 +125,24 @@ fn plugins() -> Result<()> {
     integrator::PLUGINS.iter().try_for_each(|(name, parameters)| row("integrator", name, parameters))?;
     out!("\n| left out | type | why, or what to do |\n|---|---|---|")?;
     UNSUPPORTED.iter().try_for_each(|(class, name, reason)| row(class, name, reason))
+}
+
+/// Everything besides [`describe`] that somebody needs who looks into a wrong picture.
+fn report(scene: &Scene, path: &Path) -> Result<()> {
+    out!("fluxion      {}, epoch {} of samples", env!("CARGO_PKG_VERSION"), EPOCH)?;
+    out!("machine      {}, {}", std::env::consts::OS, bench::machine())?;
+    let folder = path.parent().map(|folder| format!("{}/", folder.display())).unwrap_or_default();
+    for warning in scene.warnings() {
+        out!("warning      {}", without_folders(warning, &folder))?;
+    }
+    Ok(())
+}
+
+/// A text whose file names are left without their folders: `folder`, and those of any other word with a slash.
+fn without_folders(text: &str, folder: &str) -> String {
+    let shorter = if folder.len() > 1 { text.replace(folder, "") } else { text.to_owned() };
+    let words = shorter.split(' ').map(|word| word.rsplit(['/', '\\']).next().unwrap_or(word));
+    words.collect::<Vec<_>>().join(" ")
 }
 
 fn describe(scene: &Scene, method: &str) -> Result<()> {

@@ -4,6 +4,8 @@ mod bench;
 mod checkpoint;
 mod compare;
 mod dataset;
+#[cfg(test)]
+mod documents;
 mod host;
 mod info;
 mod interrupt;

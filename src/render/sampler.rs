@@ -2,7 +2,7 @@
 //!
 //! Even and odd samples follow a sequence each: every two dimensions are the first two of Sobol's sequence, shuffled and
 //! scrambled after Owen by hashes (Burley 2020). Pairs, pixels and the two sequences are scrambled apart, so that the halves
-//! of the samples are independent estimates; more sequences would stratify less (docs/performance.md#sequences). Every
+//! of the samples are independent estimates; more sequences would stratify less (docs/design/performance.md). Every
 //! bounce owns its dimensions, whatever happened before it.
 //!
 //! All pixels have the same position on the film in samples of the same number: the camera's ray of a pixel is then the

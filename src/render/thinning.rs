@@ -13,7 +13,7 @@ const OF: u32 = 3;
 const REST: f32 = 0.1;
 
 /// Exponents of the number of samples, and of the share of them that comes with differences, that errors of `frgr` fall with
-/// (docs/performance.md, "Differences where they pay").
+/// (docs/design/performance.md, "Differences where they pay").
 const BY_SAMPLES: f32 = 0.8;
 const BY_SHARE: f32 = 0.4;
 

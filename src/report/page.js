@@ -82,24 +82,26 @@ function plot(scene, metric, summary, colors) {
 
 function results() {
   const section = make("section", { id: "results" });
-  const methods = data.summaries[data.plotted[0]].rows.map((row) => row.method);
+  const methods = data.summaries[0].rows.map((row) => row.method);
   const colors = methods.map((method, k) => [method, COLORS[k % COLORS.length]]);
-  const scenes = [...new Set(data.summaries[data.plotted[0]].points.map((point) => point.scene))];
+  const scenes = [...new Set(data.summaries[0].points.map((point) => point.scene))];
   const [tables, plots, legend] = ["div", "div", "div"].map((tag) => make(tag));
   plots.className = "plots";
   legend.className = "legend";
   const hidden = new Set();
   const fade = () => plots.querySelectorAll("g[data-method]").forEach((group) =>
     group.classList.toggle("faded", hidden.has(group.dataset.method)));
-  const show = (metric) => {
-    const summary = data.summaries[metric];
+  const ratio = (method, summary) => summary.rows.find((row) => row.method === method)?.ratio;
+  const show = (at) => {
+    const summary = data.summaries[at];
     const rows = summary.rows.map((row) => make("tr", {}, make("td", {}, row.method),
-      ...[row.ratio, row.speedup, row.slope].map((value) => make("td", {}, short(value))),
+      ...data.summaries.map((one) => make("td", {}, short(ratio(row.method, one)))),
+      ...[row.speedup, row.slope].map((value) => make("td", {}, short(value))),
       make("td", {}, `${row.wins} of ${row.runs}`)));
-    const names = ["method", "error over primal's", "speed-up", "slope", "wins"];
+    const names = ["error over primal's", ...data.measures.map(([, name]) => name), "speed-up", "slope", "wins"];
     tables.replaceChildren(make("table", { id: "summary" },
       make("tr", {}, ...names.map((name) => make("th", {}, name))), ...rows));
-    plots.replaceChildren(...scenes.map((scene) => plot(scene, metric, summary, colors)));
+    plots.replaceChildren(...scenes.map((scene) => plot(scene, data.measures[at][0], summary, colors)));
     fade();
   };
   for (const [method, color] of colors) {
@@ -111,20 +113,33 @@ function results() {
     legend.append(button);
   }
   const choice = make("select", { id: "metric", onchange: () => show(choice.value) },
-    ...data.plotted.map((metric) => make("option", { value: metric }, metric)));
+    ...data.measures.map(([, name], at) => make("option", { value: at }, name)));
   section.append(make("h2", {}, "Error against time"), make("div", { class: "bar" }, choice), tables,
     make("p", {}, "Error over primal's: after the same time (with the same samples, if these are the budget), geometric mean over "
       + "those scenes and budgets that all methods have. Speed-up: the time path tracing would "
       + "need for the method's error at its largest budget, over the method's. Slope: median over scenes of error over "
-      + "time, as logarithms. Wins: scenes and budgets with the least error."),
+      + "time, as logarithms. Wins: scenes and budgets with the least error. These three, and the plots, are of the measure that is chosen."),
     make("p", {}, "Dots are means over seeds, bars reach from the best to the worst seed. The reference's own noise, the dashed line, "
-      + "is taken off relMSE."), legend, plots);
+      + "is taken off relMSE."), legend, plots, errors());
   if (data.leftOut.length) {
     const list = data.leftOut.map((left) => `${left.method} on ${left.scene} within ${left.budget} (${left.reason})`);
     section.append(make("p", {}, `Left out: ${list.join("; ")}.`));
   }
-  show(data.plotted[0]);
+  show(0);
   return section;
+}
+
+function errors() {
+  const cell = (entry, noisy) => make("td", noisy ? { class: "noisy" } : {}, entry ? short(entry.mean) + (entry.alike ? " =" : "") : "–");
+  const rows = data.errors.flatMap((scene) => scene.rows.map((row) => make("tr", {}, make("td", {}, scene.scene),
+    make("td", {}, scene.budget), make("td", {}, row.method),
+    ...row.errors.map((entry, at) => cell(entry, at > 0 && !scene.clean)), make("td", {}, short(scene.floor)))));
+  const names = ["scene", "budget", "method", ...data.measures.map(([, name]) => name), "floor"];
+  return make("details", { id: "errors" }, make("summary", {}, "Errors by scene"),
+    make("p", {}, "Means over seeds; = marks what does not differ significantly from the least of the scene. The floor is the "
+      + "reference's own relMSE. Where that is above a tenth of the scene's smallest relMSE, the other measures are grey: the noise of the "
+      + "reference is a part of them."),
+    make("table", {}, make("tr", {}, ...names.map((name) => make("th", {}, name))), ...rows));
 }
 
 function changes() {
@@ -160,7 +175,8 @@ function viewer(view) {
     above.style.clipPath = `inset(0 ${100 - slider.value}% 0 0)`;
     edge.style.left = `${slider.value}%`;
     const text = (picture) => picture.label + (picture.metrics.relmse === undefined ? "" :
-      `: relMSE ${short(picture.metrics.relmse)}, SMAPE ${short(picture.metrics.smape)}, FLIP ${short(picture.metrics.flip)}`);
+      `: relMSE ${short(picture.metrics.relmse)}, SMAPE ${short(picture.metrics.smape)}, FLIP ${short(picture.metrics.flip)}, `
+      + `1 - MS-SSIM ${short(1 - picture.metrics.ms_ssim)}`);
     figures.textContent = `${text(a)}  |  ${text(b)}`;
   }
   update();
@@ -184,6 +200,6 @@ if (data.changes.length) main.append(changes());
 if (data.views.length) {
   main.append(make("section", { id: "images" }, make("h2", {}, "Images"),
     make("p", {}, "Move over an image to compare two of them; tone mapped as FLIP sees them. Error maps are relMSE per "
-      + "pixel, alike for all images of a scene. Below: the squares where errors are largest."),
+      + "pixel, alike for all images of a scene. Below: the squares on which the images differ most by FLIP, a pixel three times as wide."),
     ...data.views.map(viewer)));
 }

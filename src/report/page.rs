@@ -7,19 +7,16 @@ use serde_json::json;
 
 use super::changes::Change;
 use super::picture::{data_url, heat, tone_mapped, worst};
-use super::summary::Summary;
-use crate::bench::Results;
+use super::tables::{SceneErrors, scene_errors, summaries};
+use crate::bench::{MEASURES, Results};
 use crate::error::{Error, Result};
 use crate::image::Image;
 use crate::image::io::Picture;
 use crate::metrics::{self, METRICS};
 
 /// Pixels on each side of a crop, and how many are shown.
-const CROP: usize = 40;
+const CROP: usize = 64;
 const CROPS: usize = 3;
-
-/// Metrics with plots: those that are zero for the reference itself.
-const PLOTTED: [&str; 4] = ["relmse", "smape", "flip", "mse"];
 
 /// An image with its name.
 pub struct Shown {
@@ -65,8 +62,13 @@ impl Page<'_> {
     /// The whole page.
     pub fn html(&self) -> Result<String> {
         let views = self.views.iter().map(view).collect::<Result<Vec<_>>>()?;
-        let summaries: Option<BTreeMap<&str, Summary>> =
-            self.results.map(|results| PLOTTED.iter().map(|&metric| (metric, Summary::new(results, metric))).collect());
+        let summaries = self.results.map(summaries);
+        let errors: Option<Vec<SceneErrors>> = self.results.zip(summaries.as_ref()).map(|(results, summaries)| {
+            let mut budgets: Vec<&str> = results.records.iter().map(|record| record.budget.as_str()).collect();
+            budgets.sort_unstable();
+            budgets.dedup();
+            budgets.into_iter().flat_map(|budget| scene_errors(results, summaries, budget)).collect()
+        });
         let floors: BTreeMap<&str, f64> = self.results.map_or_else(BTreeMap::new, |results| {
             results.records.iter().filter_map(|record| Some((record.scene.as_str(), record.floor?))).collect()
         });
@@ -74,8 +76,9 @@ impl Page<'_> {
         let data = json!({
             "title": self.title,
             "metrics": METRICS.iter().map(|metric| (metric.id, metric.summary)).collect::<BTreeMap<_, _>>(),
-            "plotted": PLOTTED,
+            "measures": MEASURES,
             "summaries": summaries,
+            "errors": errors,
             "floors": floors,
             "leftOut": self.results.map(|results| &results.left_out),
             "changes": self.changes,
@@ -96,14 +99,8 @@ impl Page<'_> {
 }
 
 fn view(view: &View) -> Result<serde_json::Value> {
-    let metric = metrics::find("relmse").ok_or_else(|| Error::Usage("there is no metric relmse".into()))?;
-    let mut maps = Vec::new();
+    let maps = maps(view, "relmse")?;
     let reference = &view.reference.color;
-    for Shown { label, picture } in &view.images {
-        let map = metric.measure(&picture.color, reference);
-        let map = map.map_err(|error| Error::Usage(format!("{label} of {}: {error}", view.name)))?.map;
-        maps.push(map.unwrap_or_default());
-    }
     // All maps of a scene share their colours.
     let mut tops: Vec<f32> = maps.iter().map(worst).collect();
     tops.sort_by(f32::total_cmp);
@@ -120,26 +117,40 @@ fn view(view: &View) -> Result<serde_json::Value> {
     let source = data_url(&tone_mapped(&view.reference))?;
     pictures.push(Encoded { label: "reference".into(), source, map: None, metrics: BTreeMap::new() });
     let (width, height) = (reference.width, reference.height);
+    let crops = crops(&self::maps(view, "flip")?);
     Ok(json!({
-        "name": view.name, "width": width, "height": height, "top": top, "pictures": pictures, "crops": crops(&maps),
+        "name": view.name, "width": width, "height": height, "top": top, "pictures": pictures, "crops": crops,
     }))
 }
 
-/// Corners of the squares where errors are largest, by the median over the images, so that no single one decides.
+/// A metric of every pixel of every image.
+fn maps(view: &View, metric: &str) -> Result<Vec<Image>> {
+    let metric = metrics::find(metric).ok_or_else(|| Error::Usage(format!("there is no metric {metric}")))?;
+    let map = |Shown { label, picture }: &Shown| {
+        let measured = metric.measure(&picture.color, &view.reference.color);
+        let measured = measured.map_err(|error| Error::Usage(format!("{label} of {}: {error}", view.name)))?;
+        Ok(measured.map.unwrap_or_default())
+    };
+    view.images.iter().map(map).collect()
+}
+
+/// Corners of the squares on which the images differ most to the eye: the largest mean FLIP less the smallest, or with a single
+/// image its own.
 fn crops(maps: &[Image]) -> Vec<(usize, usize)> {
     let Some(first) = maps.first() else { return Vec::new() };
     let side = CROP.min(first.width).min(first.height);
     let step = (side / 4).max(1);
-    let mean = |map: &Image, x: usize, y: usize| -> f32 {
+    let sum = |map: &Image, x: usize, y: usize| -> f32 {
         let rows = (y..y + side).map(|y| (x..x + side).map(|x| map.pixel(x, y)[0]).sum::<f32>());
         rows.sum()
     };
     let mut squares = Vec::new();
     for y in (0..=first.height - side).step_by(step) {
         for x in (0..=first.width - side).step_by(step) {
-            let mut errors: Vec<f32> = maps.iter().map(|map| mean(map, x, y)).collect();
-            errors.sort_by(f32::total_cmp);
-            squares.push((errors[errors.len() / 2], x, y));
+            let errors: Vec<f32> = maps.iter().map(|map| sum(map, x, y)).collect();
+            let largest = errors.iter().copied().fold(0.0, f32::max);
+            let smallest = if errors.len() > 1 { errors.iter().copied().fold(f32::INFINITY, f32::min) } else { 0.0 };
+            squares.push((largest - smallest, x, y));
         }
     }
     squares.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -151,4 +162,26 @@ fn crops(maps: &[Image]) -> Vec<(usize, usize)> {
         }
     }
     chosen
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn crops_are_where_images_differ_from_each_other() {
+        let spot = |x: usize, y: usize| {
+            let inside = move |a: usize, b: usize| a / CROP == x && b / CROP == y;
+            let mut map = Image::new(4 * CROP, 3 * CROP, 1);
+            for (k, value) in map.data.iter_mut().enumerate() {
+                *value = if inside(k % (4 * CROP), k / (4 * CROP)) { 1.0 } else { 0.0 };
+            }
+            map
+        };
+        let mut common = spot(0, 0);
+        common.data.iter_mut().zip(&spot(2, 1).data).for_each(|(value, other)| *value += other);
+        // Both are wrong in the first square, one of them in the other.
+        assert_eq!(crops(&[spot(0, 0), common])[0], (2 * CROP, CROP));
+        assert_eq!(crops(&[spot(3, 2)])[0], (3 * CROP, 2 * CROP));
+    }
 }

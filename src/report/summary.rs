@@ -202,83 +202,42 @@ fn line(points: &[(f64, f64)]) -> Option<(f64, f64)> {
     (xx > 1e-12 && slope.is_finite()).then_some((my - slope * mx, slope))
 }
 
-/// The summary as a Markdown table.
-pub fn table(summary: &Summary) -> String {
-    let number = |value: Option<f64>, digits: usize| value.map_or("-".into(), |value| format!("{value:.digits$}"));
-    let mut text =
-        String::from("| method | error over primal's | speed-up | slope | wins | of |\n|---|---|---|---|---|---|\n");
-    for Row { method, ratio, speedup, slope, wins, runs } in &summary.rows {
-        let (ratio, speedup, slope) = (number(*ratio, 3), number(*speedup, 1), number(*slope, 2));
-        text += &format!("| {method} | {ratio} | {speedup} | {slope} | {wins} | {runs} |\n");
-    }
-    text
-}
-
-/// Errors within a budget as a Markdown table: a row for each method, a column for each scene. Errors are means over the seeds
-/// with their standard errors in percent; `=` marks those that do not differ significantly from the least of their scene.
-pub fn errors(summary: &Summary, budget: &str) -> String {
-    let mut scenes: Vec<&str> = Vec::new();
-    for point in &summary.points {
-        if !scenes.contains(&point.scene.as_str()) {
-            scenes.push(&point.scene);
+/// Errors of `scale / t^power` at 1, 2 and 4 seconds, with the seeds apart by a factor of 1.1 each way.
+#[cfg(test)]
+pub fn test_results(methods: &[(&str, f64, f64)]) -> Results {
+    let mut results = Results::default();
+    for (method, scale, power) in methods {
+        for (k, t) in [1.0, 2.0, 4.0f64].into_iter().enumerate() {
+            for seed in [1, 2] {
+                let error = scale / t.powf(*power) * if seed == 1 { 0.9 } else { 1.1 };
+                results.records.push(Record {
+                    scene: "room".into(),
+                    method: (*method).into(),
+                    budget: format!("{}s", 1 << k),
+                    seed,
+                    width: 1,
+                    height: 1,
+                    fingerprint: String::new(),
+                    spp: 1,
+                    seconds: crate::bench::Seconds { total: t, ..crate::bench::Seconds::default() },
+                    metrics: ["relmse", "smape"].map(|name| (name.to_owned(), error)).into(),
+                    negative: 0.0,
+                    rejected: 0,
+                    peak_bytes: 0,
+                    floor: None,
+                    machine: String::new(),
+                    version: String::new(),
+                });
+            }
         }
     }
-    let within: Vec<&Point> = summary.points.iter().filter(|point| point.budget == budget).collect();
-    let mut text = format!("| {budget} | {} |\n|{}\n", scenes.join(" | "), "---|".repeat(scenes.len() + 1));
-    for Row { method, .. } in &summary.rows {
-        let cells = scenes.iter().map(|scene| {
-            let here = within.iter().filter(|point| point.scene == *scene);
-            let own = here.clone().find(|point| point.method == *method);
-            let best = here.min_by(|a, b| a.error().total_cmp(&b.error()));
-            own.zip(best).map_or("-".into(), |(own, best)| cell(own, best))
-        });
-        text += &format!("| {method} | {} |\n", cells.collect::<Vec<_>>().join(" | "));
-    }
-    text
-}
-
-/// A point's error, as beside that of the scene's best.
-fn cell(own: &Point, best: &Point) -> String {
-    let noise = own.standard_error().map_or(String::new(), |error| format!(" ±{:.0} %", 100.0 * error / own.error()));
-    let alike = own.method != best.method && own.errors.len() > 1 && !own.differs(best);
-    format!("{:.2e}{noise}{}", own.error(), if alike { " =" } else { "" })
+    results
 }
 
 #[cfg(test)]
 mod tests {
+    use super::test_results as results;
     use super::*;
-    use crate::bench::Seconds;
-
-    /// Errors of `scale / t^power` at 1, 2 and 4 seconds, with the seeds apart by a factor of 1.1 each way.
-    fn results(methods: &[(&str, f64, f64)]) -> Results {
-        let mut results = Results::default();
-        for (method, scale, power) in methods {
-            for (k, t) in [1.0, 2.0, 4.0f64].into_iter().enumerate() {
-                for seed in [1, 2] {
-                    let error = scale / t.powf(*power) * if seed == 1 { 0.9 } else { 1.1 };
-                    results.records.push(Record {
-                        scene: "room".into(),
-                        method: (*method).into(),
-                        budget: format!("{}s", 1 << k),
-                        seed,
-                        width: 1,
-                        height: 1,
-                        fingerprint: String::new(),
-                        spp: 1,
-                        seconds: Seconds { total: t, ..Seconds::default() },
-                        metrics: [("relmse".to_owned(), error)].into(),
-                        negative: 0.0,
-                        rejected: 0,
-                        peak_bytes: 0,
-                        floor: None,
-                        machine: String::new(),
-                        version: String::new(),
-                    });
-                }
-            }
-        }
-        results
-    }
 
     #[test]
     fn figures_are_those_of_exact_power_laws() {
@@ -291,26 +250,6 @@ mod tests {
         assert!(close(row(2).ratio, 0.3 * 2f64.sqrt()) && close(row(2).slope, -0.5));
         assert!(close(row(2).speedup, 1.0 / (0.3 / 2.0) / 4.0));
         assert_eq!((row(0).wins, row(1).wins, row(2).wins), (0, 3, 0));
-        assert!(table(&summary).contains("| good | 0.100 | 10.0 | -1.00 | 3 | 3 |"));
-        let errors = errors(&summary, "4s");
-        assert!(
-            errors.starts_with("| 4s | room |\n|---|---|\n") && errors.contains("| good | 2.50e-2 ±10 % |"),
-            "{errors}"
-        );
-    }
-
-    #[test]
-    fn what_does_not_differ_is_marked() {
-        let mut results = results(&[("primal", 1.0, 1.0), ("good", 0.1, 1.0), ("alike", 0.1, 1.0)]);
-        let mut alike: Vec<_> = results.records.iter_mut().filter(|record| record.method == "alike").collect();
-        alike.iter_mut().for_each(|record| {
-            let factor = if record.seed == 1 { 1.03 } else { 0.98 };
-            record.metrics.values_mut().for_each(|error| *error *= factor);
-        });
-        let text = errors(&Summary::new(&results, "relmse"), "4s");
-        assert_eq!(text.matches('=').count(), 1, "{text}");
-        let marked = text.lines().find(|line| line.contains('=')).unwrap();
-        assert!(marked.starts_with("| good") || marked.starts_with("| alike"), "{text}");
     }
 
     #[test]

@@ -3,9 +3,9 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Modules, and the modules that each may use besides itself and [`EVERYBODYS`], as docs/architecture.md says.
+/// Modules, and the modules that each may use besides itself and [`EVERYBODYS`], as docs/design/architecture.md says.
 fn allowed() -> Vec<(String, Vec<String>)> {
-    let text = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/architecture.md")).unwrap();
+    let text = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/design/architecture.md")).unwrap();
     let rows = text.lines().filter_map(|line| line.strip_prefix("| `src/")?.strip_suffix('|'));
     let row = |row: &str| {
         let cells: Vec<_> = row.split('|').map(str::trim).collect();
@@ -13,7 +13,7 @@ fn allowed() -> Vec<(String, Vec<String>)> {
         (module, cells[2].split(", ").filter(|used| !used.is_empty()).map(str::to_owned).collect())
     };
     let found: Vec<_> = rows.map(row).collect();
-    assert!(found.len() > 20, "the table of docs/architecture.md was not found");
+    assert!(found.len() > 20, "the table of docs/design/architecture.md was not found");
     found
 }
 

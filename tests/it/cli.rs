@@ -130,9 +130,27 @@ fn the_program_tells_what_it_knows() {
 }
 
 #[test]
+fn a_report_says_everything_but_where_files_are() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = "<scene version=\"3.0.0\"><sensor type=\"perspective\"><film type=\"hdrfilm\"><float name=\"exposure\" value=\"1\"/></film>\
+                </sensor><shape type=\"sphere\"/></scene>";
+    let file = folder.path().join("odd room.xml");
+    std::fs::write(&file, text).unwrap();
+    let output = fluxion(folder.path()).args(["info", "--report"]).arg(&file).output().unwrap();
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    for expected in
+        ["epoch 1 of samples", "threads", "warning      odd room.xml:1:", "Embree", "fingerprint", "gradients"]
+    {
+        assert!(text.contains(expected), "{expected}: {text}");
+    }
+    assert!(!text.contains(&folder.path().display().to_string()), "{text}");
+}
+
+#[test]
 fn the_documents_hold_what_the_program_prints() {
     let folder = tempfile::tempdir().unwrap();
-    for (flag, document) in [("--plugins", "docs/mitsuba-support.md"), ("--layers", "docs/layers.md")] {
+    for (flag, document) in [("--plugins", "docs/figures/plugins.md"), ("--layers", "docs/figures/layers.md")] {
         let output = fluxion(folder.path()).args(["info", flag]).output().unwrap();
         let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(document)).unwrap();
         assert!(text.contains(&*String::from_utf8_lossy(&output.stdout)), "{document} is not up to date with {flag}");

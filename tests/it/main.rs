@@ -12,6 +12,7 @@ mod coordinates;
 mod corrupt;
 mod curves;
 mod dataset;
+mod documents;
 mod edges;
 mod epoch;
 mod film;

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crate::architecture::{files_below, sources};
 
-/// Words that were replaced by the field's terms, as whole identifiers. docs/glossary.md has the terms.
+/// Words that were replaced by the field's terms, as whole identifiers. docs/design/glossary.md has the terms.
 const RETIRED: &[&str] = &[
     "Onward",
     "Room",

@@ -4,17 +4,22 @@
 
 Prints for every scene the ratio of both images' means, its standard error, the share of 8x8 blocks that differ by more than
 four of theirs, and the share of pixels that are compared: Mitsuba's may be no numbers. Run from the repository's top folder
-after `cargo build --release`. Needs PyPI mitsuba, openimageio and numpy, and DRJIT_LIBLLVM_PATH naming libLLVM.
+after `cargo build --release`. Needs PyPI mitsuba, openimageio and numpy, and LLVM.
 """
 import argparse
 import os
 import sys
+import tempfile
 
-import mitsuba
 import numpy as np
 
-sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."))
-import against_mitsuba
+TOOLS = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..")
+sys.path[:0] = [TOOLS, os.path.join(TOOLS, "figures")]
+import exr
+import peers
+import program
+
+VARIANT = "llvm_ad_rgb"
 
 SIZE, BLOCK, RUNS = 64, 8, 4
 
@@ -39,16 +44,21 @@ def means(images, known):
 
 
 def by_mitsuba(path):
-    scene = against_mitsuba.mitsuba_scene(mitsuba, path, (SIZE, SIZE))
-    return lambda seed, spp: np.array(mitsuba.render(scene, seed=seed, spp=spp))[..., :3]
+    scene = peers.load(VARIANT, path, (SIZE, SIZE))
+    return lambda seed, spp: peers.render(VARIANT, scene, spp, seed)
 
 
 def by_fluxion(path):
-    return lambda seed, spp: against_mitsuba.fluxion(path, (SIZE, SIZE), spp, "primal", seed)[0]
+    def render(seed, spp):
+        with tempfile.TemporaryDirectory() as folder:
+            image = os.path.join(folder, "image.exr")
+            program.call("render", path, "-o", image, "--size", f"{SIZE}x{SIZE}", "--spp", spp, "--seed", seed, "--method", "primal", "-q")
+            return exr.rgb(image)
+
+    return render
 
 
 def main(options):
-    mitsuba.set_variant("llvm_ad_rgb")
     print("| scene | ratio of means | standard error | blocks beyond 4 | pixels |\n|---|---|---|---|---|")
     for path in options.scenes:
         ours, theirs = runs(by_fluxion(path), options.spp), runs(by_mitsuba(path), options.spp)

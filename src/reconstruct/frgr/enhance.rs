@@ -14,7 +14,7 @@ use crate::solve::graph::Quad;
 use crate::solve::poisson::{Targets, Weights};
 
 /// Pull towards the denoised image in the authors' form. Their gradient descent starts there and stops after a
-/// thousand small steps; a penalty of this weight acts alike on every frequency (docs/frgr.md).
+/// thousand small steps; a penalty of this weight acts alike on every frequency (docs/design/frgr.md).
 const CODE_SCREEN: f32 = 100.0;
 
 /// In the printed form only the differences matter; without any pull the equations would have no single solution.

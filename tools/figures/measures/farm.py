@@ -1,0 +1,38 @@
+"""Processor time of a render in one go over that of its chunks with their merge."""
+import os
+import resource
+import shutil
+
+import program
+from scenes import ROOT
+
+SCENE = os.path.join(ROOT, "scenes", "cornell-box", "scene.xml")
+
+
+def cells(run, where):
+    return [[chunks, turn] for turn in range(run["rounds"]) for chunks in run["chunks"]]
+
+
+def processor_time(work):
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    work()
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
+def measure(cell, run, where, folder):
+    chunks, turn = cell
+    options = ["--size", run["size"], "--method", "l2"]
+    checkpoint, job = os.path.join(folder, "one.ckpt"), os.path.join(folder, "job")
+
+    def in_chunks():
+        program.call("job", "plan", SCENE, "--spp", run["spp"], "--chunks", chunks, "-o", job, "--", *options, "-q")
+        for chunk in range(chunks):
+            program.call("job", "run", job, chunk)
+        program.call("job", "merge", job, "--no-image")
+
+    whole = processor_time(lambda: program.call("render", SCENE, "--spp", run["spp"], *options, "-q", "--checkpoint", checkpoint))
+    parts = processor_time(in_chunks)
+    os.remove(checkpoint)
+    shutil.rmtree(job)
+    return [{"chunks": chunks, "turn": turn, "whole": whole, "parts": parts}]

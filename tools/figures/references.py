@@ -1,0 +1,114 @@
+"""References of the scenes of figures/scenes.toml.
+
+A reference is the mean of two halves with seeds of their own, NAME.exr; half of their difference, squared, is the variance of that mean,
+NAME_var.exr, as `fluxion bench` takes it. Each half is one render that is continued from its checkpoint, by path tracing or by the
+linear screened Poisson solution `l2`, whichever has less error for its time on the scene. Both are unbiased; nothing is denoised.
+"""
+import json
+import os
+import subprocess
+import time
+
+import numpy as np
+
+import exr
+import scenes
+
+# Far from the seeds of what is judged.
+SEEDS = (977001, 977002)
+METHODS = ("primal", "l2")
+FIRST = 64
+# Exit code of a render that a signal has stopped; its samples are saved.
+STOPPED = 75
+
+
+class Reference:
+    """The state of a scene's reference, in a folder."""
+
+    def __init__(self, scene, folder):
+        self.scene, self.folder = scene, folder
+        self.state = {}
+        if os.path.exists(self.at(".json")):
+            with open(self.at(".json")) as file:
+                self.state = json.load(file)
+
+    def at(self, end):
+        return os.path.join(self.folder, self.scene.name + end)
+
+    @property
+    def seconds(self):
+        return self.state.get("seconds", 0.0)
+
+    @property
+    def floor(self):
+        return self.state.get("floor", float("inf"))
+
+    def go_on(self):
+        """Twice the samples."""
+        if not self.state:
+            self.begin()
+            return
+        method, spp = self.state["method"], 2 * self.state["spp"]
+        self.save(method, spp, *self.halves(method, spp))
+
+    def begin(self):
+        """Chooses the method, by its squared error times its seconds."""
+        tried = {method: self.halves(method, FIRST) for method in METHODS}
+        best = min(METHODS, key=lambda method: floor(*tried[method][0]) * tried[method][1])
+        for method in METHODS:
+            if method != best:
+                for seed in SEEDS:
+                    os.remove(self.at(f"-{method}-{seed}.ckpt"))
+        self.save(best, FIRST, *tried[best])
+
+    def halves(self, method, spp):
+        """Both images, and the seconds of all their samples."""
+        images, seconds = [], 0.0
+        for seed in SEEDS:
+            image, stats = self.at("-half.exr"), self.at("-half.json")
+            command = ["render", self.scene.path, "-o", image, "--json", stats, "--size", self.scene.size, "--method", method, "--spp", spp,
+                       "--seed", seed, "--checkpoint", self.at(f"-{method}-{seed}.ckpt"), "--resume", "-q"]
+            done = subprocess.run([scenes.FLUXION, *map(str, command)], check=False)
+            if done.returncode == STOPPED:
+                raise KeyboardInterrupt
+            done.check_returncode()
+            images.append(exr.rgb(image))
+            with open(stats) as file:
+                seconds += json.load(file)["seconds"]["render"]
+            os.remove(image)
+            os.remove(stats)
+        return images, seconds
+
+    def save(self, method, spp, images, seconds):
+        first, second = images
+        exr.write(self.at(".exr"), (first + second) / 2)
+        exr.write(self.at("_var.exr"), (first - second) ** 2 / 4)
+        self.state = {"method": method, "spp": spp, "seconds": self.seconds + seconds, "floor": floor(first, second)}
+        with open(self.at(".json.part"), "w") as file:
+            json.dump(self.state, file)
+        os.replace(self.at(".json.part"), self.at(".json"))
+
+
+def floor(first, second):
+    """relMSE of the mean of two halves against the truth."""
+    mean = (first + second) / 2
+    return float(((first - second) ** 2 / 4 / (mean ** 2 + 0.01)).mean())
+
+
+def make(public, folder, hours):
+    """Continues the reference that has had the least time until all are good or the hours are over."""
+    os.makedirs(folder, exist_ok=True)
+    wanted, target = scenes.load(public)
+    references = [Reference(scene, folder) for scene in wanted]
+    end = time.monotonic() + 3600 * hours
+    while time.monotonic() < end:
+        left = [reference for reference in references if reference.floor > target]
+        if not left:
+            break
+        reference = min(left, key=lambda reference: reference.seconds)
+        reference.go_on()
+        print("%s: %s, %d samples in each half, %.0f s, floor %.1e" % (
+            reference.scene.name, reference.state["method"], reference.state["spp"], reference.seconds, reference.floor), flush=True)
+    for reference in references:
+        if reference.floor > target:
+            print("%s: floor %.1e, wanted %.1e: run this again" % (reference.scene.name, reference.floor, target))

@@ -1,0 +1,140 @@
+"""Markdown tables of runs. Only Python's own library is needed, since tests print them, too."""
+import math
+import statistics
+
+# Keys of the four measures, and their names.
+MEASURES = {"relmse": "relMSE", "smape": "SMAPE", "flip": "FLIP", "dissimilarity": "1 - MS-SSIM"}
+# Reference noise above this share of a scene's smallest relMSE shows in the other measures, from which it cannot be taken off.
+CLEAN = 0.1
+
+
+def table(specification, runs):
+    """A table by its form."""
+    return FORMS[specification["form"]](specification, runs)
+
+
+def markdown(header, rows):
+    lines = [header, ["---"] * len(header), *rows]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+
+
+def unique(values):
+    return list(dict.fromkeys(values))
+
+
+def geometric(values):
+    return math.exp(statistics.fmean(map(math.log, values)))
+
+
+class Errors:
+    """Means over seeds by budget, scene and candidate."""
+
+    def __init__(self, runs, candidate):
+        self.runs, self.of = runs, {}
+        collected = {}
+        for run in runs:
+            key = run["budget"], run["scene"], candidate(run)
+            collected.setdefault(key, []).append(run)
+        for key, same in collected.items():
+            self.of[key] = {name: statistics.fmean(run[name] for run in same) for name in (*MEASURES, "spp", "seconds", "floor")}
+        self.budgets = unique(budget for budget, _, _ in self.of)
+        self.scenes = unique(scene for _, scene, _ in self.of)
+
+    def clean(self, budget, scene):
+        """Whether the scene's reference is good enough for measures that its noise cannot be taken off."""
+        here = [values for (b, s, _), values in self.of.items() if (b, s) == (budget, scene)]
+        return here[0]["floor"] <= CLEAN * min(values["relmse"] for values in here)
+
+    def has(self, budget, scene, *candidates):
+        return all((budget, scene, candidate) in self.of for candidate in candidates)
+
+
+def candidate_of(specification):
+    keys = specification.get("candidate", ["method"])
+    return lambda run: ", ".join(str(run[key]) for key in keys if run[key] != "")
+
+
+def ratios(specification, runs):
+    """Geometric means over scenes of errors over those of a baseline, and the worst scene."""
+    errors, baseline = Errors(runs, candidate_of(specification)), specification["baseline"]
+    candidates = specification.get("candidates") or unique(map(candidate_of(specification), runs))
+    header = ["budget", "candidate"] + [name for measure in MEASURES.values() for name in (measure, "worst")] + ["better in", "samples"]
+    rows = []
+    for budget in specification.get("budgets", errors.budgets):
+        scenes = [scene for scene in errors.scenes if errors.has(budget, scene, baseline, *candidates)]
+        clean = [scene for scene in scenes if errors.clean(budget, scene)]
+        for candidate in candidates:
+            cells, better = [], 0
+            for measure in MEASURES:
+                counted = scenes if measure == "relmse" else clean
+                of = [errors.of[budget, scene, candidate][measure] / errors.of[budget, scene, baseline][measure] for scene in counted]
+                cells += ["%.2f" % geometric(of), "%.2f" % max(of)] if of else ["-", "-"]
+                better += bool(of) and geometric(of) < 1
+            spp = geometric(errors.of[budget, scene, candidate]["spp"] for scene in scenes)
+            rows.append([budget, "`%s`" % candidate, *cells, "-" if candidate == baseline else "%d of 4" % better, "%.0f" % spp])
+        rows[-len(candidates)][0] += " (%d scenes, %d)" % (len(scenes), len(clean))
+        for row in rows[1 - len(candidates):] if len(candidates) > 1 else []:
+            row[0] = ""
+    return markdown(header, rows)
+
+
+def scenes(specification, runs):
+    """The four errors of every scene by some candidates, and the floor of its reference."""
+    errors, candidates = Errors(runs, candidate_of(specification)), specification["candidates"]
+    header = ["budget", "scene", *("`%s`" % candidate for candidate in candidates), "floor"]
+    rows = []
+    for budget in specification.get("budgets", errors.budgets):
+        for scene in errors.scenes:
+            if not errors.has(budget, scene, *candidates):
+                continue
+            cells = [four(errors.of[budget, scene, candidate], errors.clean(budget, scene)) for candidate in candidates]
+            rows.append([budget, scene, *cells, "%.1e" % errors.of[budget, scene, candidates[0]]["floor"]])
+    return markdown(header, rows)
+
+
+def four(values, clean):
+    """The numbers of an image; those that the reference's noise is part of in parentheses."""
+    relmse, *others = (values[measure] for measure in MEASURES)
+    others = " ".join("%.3f" % value for value in others)
+    return "%.1e %s" % (relmse, others if clean else "(%s)" % others)
+
+
+def rows(specification, runs):
+    """A row for each value of a key, a column for each other key or quotient of two; medians or means of all its runs."""
+    key, columns = specification["key"], specification["columns"]
+    combine = {"median": statistics.median, "mean": statistics.fmean, "first": lambda values: values[0]}[specification.get("combine", "median")]
+    lines, last = [], []
+    for name in unique(run[key] for run in runs):
+        same = [run for run in runs if run[key] == name]
+        lines.append([str(name)] + [show(column, same, combine) for column in columns])
+    if "mean_of" in specification:
+        for column in columns:
+            keep = column["name"] in specification["mean_of"]
+            values = [amount(column["value"], [run for run in runs if run[key] == name], combine) for name in unique(run[key] for run in runs)]
+            last.append(column["format"] % geometric(values) if keep else "")
+        lines.append(["geometric mean", *last])
+    return markdown([specification.get("head", key), *(column["name"] for column in columns)], lines)
+
+
+def amount(value, same, combine):
+    """The value of an expression such as `a`, `a / b` or `a * b`."""
+    for sign, joined in ((" / ", lambda a, b: a / b), (" * ", lambda a, b: a * b)):
+        if sign in value:
+            return joined(*(amount(part, same, combine) for part in value.split(sign)))
+    return combine([run[value] for run in same])
+
+
+def show(column, same, combine):
+    if column["value"] not in same[0]:
+        if any(sign in column["value"] for sign in (" / ", " * ")):
+            return column["format"] % amount(column["value"], same, combine)
+        return "-"
+    first = same[0][column["value"]]
+    if isinstance(first, list):
+        return " ".join(column["format"] % value for value in first)
+    if isinstance(first, str) or first is None:
+        return first or "-"
+    return column["format"] % amount(column["value"], same, combine)
+
+
+FORMS = {"ratios": ratios, "scenes": scenes, "rows": rows}
