@@ -68,9 +68,9 @@ pub const MEASURES: [(&str, &str); 4] =
 const KNOWN: f64 = 0.05;
 
 impl Record {
-    /// The error by a metric, that by MS-SSIM being what it lacks to one. The reference's own noise is taken off where it adds to the error, which is of relMSE: with the
-    /// halves A and B of a reference R this leaves the mean of (I - A)(I - B) / (R² + 0.01), which is without bias. It is at
-    /// least 5 % of that noise, below which nothing is known.
+    /// The error by a metric; that by MS-SSIM is what it lacks to one. The reference's own noise is taken off where it adds to the
+    /// error, which is of relMSE: with the halves A and B of a reference R this leaves the mean of
+    /// (I - A)(I - B) / (R² + 0.01), which is without bias. It is at least 5 % of that noise, below which nothing is known.
     pub fn error(&self, metric: &str) -> Option<f64> {
         let measured = *self.metrics.get(metric)?;
         Some(match self.floor {

@@ -69,10 +69,14 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         KERNELS.iter().try_for_each(|kernel| out!("{:>10}  {}; {}", kernel.id, kernel.summary, kernel.takes()))?;
     }
     match &args.scene {
-        Some(path) if super::stored::describe(path)? => {}
+        Some(path) if super::stored::describe(path)? => {
+            if args.report {
+                bail!(Error::Usage("--report is about scenes: give the scene's file".into()));
+            }
+        }
         Some(path) => {
             let options = mitsuba::Options { sensor_optional: true, ..args.options.options() };
-            let scene = super::scene::load(path, &options)?;
+            let scene = if args.report { mitsuba::load(path, &options)? } else { super::scene::load(path, &options)? };
             if args.report {
                 report(&scene, path)?;
             }
@@ -131,18 +135,19 @@ fn plugins() -> Result<()> {
 fn report(scene: &Scene, path: &Path) -> Result<()> {
     out!("fluxion      {}, epoch {} of samples", env!("CARGO_PKG_VERSION"), EPOCH)?;
     out!("machine      {}, {}", std::env::consts::OS, bench::machine())?;
-    let folder = path.parent().map(|folder| format!("{}/", folder.display())).unwrap_or_default();
+    let folder = path.parent().unwrap_or(Path::new(""));
     for warning in scene.warnings() {
-        out!("warning      {}", without_folders(warning, &folder))?;
+        out!("warning      {}", without_folder(warning, folder))?;
     }
     Ok(())
 }
 
-/// A text whose file names are left without their folders: `folder`, and those of any other word with a slash.
-fn without_folders(text: &str, folder: &str) -> String {
-    let shorter = if folder.len() > 1 { text.replace(folder, "") } else { text.to_owned() };
-    let words = shorter.split(' ').map(|word| word.rsplit(['/', '\\']).next().unwrap_or(word));
-    words.collect::<Vec<_>>().join(" ")
+/// A warning whose file is named without its folders: the scene's, or those of a name that leads elsewhere.
+fn without_folder(warning: &str, folder: &Path) -> String {
+    let below = warning.strip_prefix(&*folder.to_string_lossy()).unwrap_or(warning);
+    let (file, what) = below.split_once(": ").unwrap_or((below, ""));
+    let name = file.rsplit(['/', '\\']).next().unwrap_or(file);
+    format!("{name}: {what}")
 }
 
 fn describe(scene: &Scene, method: &str) -> Result<()> {

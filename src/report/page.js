@@ -176,7 +176,7 @@ function viewer(view) {
     edge.style.left = `${slider.value}%`;
     const text = (picture) => picture.label + (picture.metrics.relmse === undefined ? "" :
       `: relMSE ${short(picture.metrics.relmse)}, SMAPE ${short(picture.metrics.smape)}, FLIP ${short(picture.metrics.flip)}, `
-      + `1 - MS-SSIM ${short(1 - picture.metrics.ms_ssim)}`);
+      + `1 - MS-SSIM ${short(picture.metrics.ms_ssim === null ? null : 1 - picture.metrics.ms_ssim)}`);
     figures.textContent = `${text(a)}  |  ${text(b)}`;
   }
   update();

@@ -64,9 +64,12 @@ impl Page<'_> {
         let views = self.views.iter().map(view).collect::<Result<Vec<_>>>()?;
         let summaries = self.results.map(summaries);
         let errors: Option<Vec<SceneErrors>> = self.results.zip(summaries.as_ref()).map(|(results, summaries)| {
-            let mut budgets: Vec<&str> = results.records.iter().map(|record| record.budget.as_str()).collect();
-            budgets.sort_unstable();
-            budgets.dedup();
+            let mut budgets: Vec<&str> = Vec::new();
+            for record in &results.records {
+                if !budgets.contains(&record.budget.as_str()) {
+                    budgets.push(&record.budget);
+                }
+            }
             budgets.into_iter().flat_map(|budget| scene_errors(results, summaries, budget)).collect()
         });
         let floors: BTreeMap<&str, f64> = self.results.map_or_else(BTreeMap::new, |results| {

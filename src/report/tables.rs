@@ -131,12 +131,16 @@ mod tests {
 
     #[test]
     fn tables_have_the_four_measures_side_by_side() {
-        let results = test_results(&[("primal", 1.0, 1.0), ("good", 0.1, 1.0)]);
+        let mut results = test_results(&[("primal", 1.0, 1.0), ("good", 0.1, 1.0)]);
+        for record in &mut results.records {
+            let likeness = if record.method == "good" { 0.9 } else { 0.6 };
+            record.metrics.insert("ms_ssim".into(), likeness);
+        }
         let summaries = summaries(&results);
         let text = ratios(&summaries);
-        assert!(text.contains("| good | 0.100 | 0.100 | - | - | 10.0 | -1.00 | 3 | 3 |"), "{text}");
+        assert!(text.contains("| good | 0.100 | 0.100 | - | 0.250 | 10.0 | -1.00 | 3 | 3 |"), "{text}");
         let text = errors(&scene_errors(&results, &summaries, "4s"));
-        assert!(text.contains("| room | good | 2.50e-2 ±10 % | 0.0250 | - | - | - |"), "{text}");
+        assert!(text.contains("| room | good | 2.50e-2 ±10 % | 0.0250 | - | 0.1000 | - |"), "{text}");
     }
 
     #[test]

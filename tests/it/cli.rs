@@ -132,19 +132,26 @@ fn the_program_tells_what_it_knows() {
 #[test]
 fn a_report_says_everything_but_where_files_are() {
     let folder = tempfile::tempdir().unwrap();
-    let text = "<scene version=\"3.0.0\"><sensor type=\"perspective\"><film type=\"hdrfilm\"><float name=\"exposure\" value=\"1\"/></film>\
-                </sensor><shape type=\"sphere\"/></scene>";
-    let file = folder.path().join("odd room.xml");
-    std::fs::write(&file, text).unwrap();
-    let output = fluxion(folder.path()).args(["info", "--report"]).arg(&file).output().unwrap();
-    let text = String::from_utf8_lossy(&output.stdout).into_owned();
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    for expected in
-        ["epoch 1 of samples", "threads", "warning      odd room.xml:1:", "Embree", "fingerprint", "gradients"]
+    let (scenes, elsewhere) = (folder.path().join("of John Doe"), folder.path().join("else where"));
+    [&scenes, &elsewhere].map(|folder| std::fs::create_dir(folder).unwrap());
+    std::fs::write(elsewhere.join("ball.obj"), "v 0 0 0\n").unwrap();
+    let text = format!(
+        "<scene version=\"3.0.0\"><sensor type=\"perspective\"><film type=\"hdrfilm\"><float name=\"exposure\" value=\"1\"/>\
+         </film></sensor><shape type=\"sphere\"/><shape type=\"obj\"><string name=\"filename\" value=\"{}\"/></shape></scene>",
+        elsewhere.join("ball.obj").display()
+    );
+    std::fs::write(scenes.join("odd room.xml"), text).unwrap();
+    let output = fluxion(folder.path()).args(["info", "--report"]).arg(scenes.join("odd room.xml")).output().unwrap();
+    let (text, error) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    assert!(output.status.success(), "{error}");
+    let warnings = ["warning      odd room.xml:1: the film's `exposure`", "warning      ball.obj"];
+    for expected in ["epoch 1 of samples", "threads", "Embree", "fingerprint", "gradients"].into_iter().chain(warnings)
     {
         assert!(text.contains(expected), "{expected}: {text}");
     }
-    assert!(!text.contains(&folder.path().display().to_string()), "{text}");
+    for private in ["John", "Doe", "else where", &*folder.path().to_string_lossy()] {
+        assert!(!text.contains(private) && !error.contains(private), "{text}\n{error}");
+    }
 }
 
 #[test]

@@ -31,6 +31,9 @@ def check(_):
     wrong = pages.check()
     if wrong:
         sys.exit("%s: not what the figures say; `python3 tools/figures print` mends it" % ", ".join(wrong))
+    other = [one.name for one in figure.every() if "run" in (one.changed() or [])]
+    if other:
+        sys.exit("%s: measured otherwise than figures/NAME.toml says; `make figures NAME=...` mends it" % ", ".join(other))
 
 
 def print_pages(_):
@@ -45,14 +48,25 @@ def make_references(options):
 
 
 def run(options):
+    import program
     import runner
 
     where = runner.context(options.scenes, options.work)
-    for one in figure.every():
-        wanted = one.name in options.names if options.names else one.changed() != []
-        if wanted:
+    known = {one.name: one for one in figure.every()}
+    unknown = [name for name in options.names if name not in known]
+    if unknown:
+        sys.exit("there is no figure %s; there are %s" % (", ".join(unknown), ", ".join(known)))
+    wanted = [known[name] for name in options.names] or [one for one in known.values() if one.changed() != []]
+    failed = []
+    for one in wanted:
+        try:
             runner.run(one, where)
             pages.print_all()
+        except program.Failed as error:
+            failed.append(one.name)
+            print("%s: %s" % (one.name, error), file=sys.stderr, flush=True)
+    if failed:
+        sys.exit("not measured: " + ", ".join(failed))
 
 
 def main():

@@ -1,19 +1,17 @@
 """Figures: what figures/NAME.toml asks for, and what docs/figures/NAME.json holds."""
-import hashlib
 import json
 import os
 import subprocess
 import tomllib
 from datetime import date
 
+import scenes
+import sources
 from scenes import ROOT
 
 SPECIFICATIONS = os.path.join(ROOT, "figures")
 RESULTS = os.path.join(ROOT, "docs", "figures")
-# Lines of code that say nothing to a compiler.
-COMMENT = ("//",)
-CODE = (".rs", ".h", ".c", ".cpp")
-# Measures that take every scene there is.
+# Measures that take every scene of figures/scenes.toml but those that the figure leaves out.
 OF_ALL_SCENES = ("agreement", "bench", "samples")
 
 
@@ -32,11 +30,22 @@ class Figure:
     def file(self):
         return os.path.join(RESULTS, self.name + ".json")
 
+    def sizes(self):
+        """The scenes of figures/scenes.toml that it measures, with their sizes."""
+        known, run = scenes.sizes(), self["run"]
+        if self["measure"] in OF_ALL_SCENES:
+            names = [name for name in known if name not in run.get("without", [])]
+        else:
+            names = [run["scene"]] if "scene" in run else run.get("scenes", [])
+        return {name: known[name] for name in names if name in known}
+
     def inputs(self):
-        """Digests of what decides the figure: folders of the program, and what is run."""
-        text = json.dumps([self["measure"], self["run"]], sort_keys=True)
-        scenes = {"figures/scenes.toml": digest("figures/scenes.toml")} if self["measure"] in OF_ALL_SCENES else {}
-        return {"run": digest_of_text(text), **scenes, **{folder: digest(folder) for folder in self["depends"]}}
+        """Digests of what decides the figure: what is run on which scenes, by which code."""
+        asked = {"run": [self["measure"], self["run"]], **({"sizes": self.sizes()} if self.sizes() else {})}
+        bundled = [os.path.join("scenes", name) for name in self.sizes() if name in scenes.bundled()]
+        paths = ["tools/figures/measures/%s.py" % self["measure"], *bundled, *sources.all_below(self["depends"])]
+        digests = {key: sources.of_text(json.dumps(value, sort_keys=True)) for key, value in asked.items()}
+        return {**digests, **{path: sources.of_path(path) for path in paths}}
 
     def results(self):
         """What was measured; None before the first time."""
@@ -50,16 +59,20 @@ class Figure:
         results = self.results()
         if results is None:
             return None
-        return [name for name, value in self.inputs().items() if results["inputs"].get(name) != value]
+        now = self.inputs()
+        return [name for name in {**now, **results["inputs"]} if results["inputs"].get(name) != now.get(name)]
 
-    def save(self, runs, seconds):
-        """Stores the runs, one a line."""
-        head = {"commit": commit(self["depends"]), "date": date.today().isoformat(), "machine": machine(), "minutes": round(seconds / 60, 1),
+    def head(self):
+        """What is written down before the first run."""
+        return {"commit": commit(sources.all_below(self["depends"])), "date": date.today().isoformat(), "machine": machine(),
                 "inputs": self.inputs()}
+
+    def save(self, head, runs, seconds):
+        """Stores the runs, one a line."""
         lines = ",\n".join(json.dumps(rounded(run)) for run in runs)
         os.makedirs(RESULTS, exist_ok=True)
         with open(self.file + ".part", "w") as file:
-            file.write(json.dumps(head)[:-1] + ', "runs": [\n' + lines + "\n]}\n")
+            file.write(json.dumps({**head, "minutes": round(seconds / 60, 1)})[:-1] + ', "runs": [\n' + lines + "\n]}\n")
         os.replace(self.file + ".part", self.file)
 
 
@@ -78,30 +91,10 @@ def rounded(value):
     return float("%.5g" % value) if isinstance(value, float) else value
 
 
-def digest_of_text(text):
-    return hashlib.sha256(text.encode()).hexdigest()[:16]
-
-
-def digest(path):
-    """Of a file or folder. Comments and empty lines of code do not count, nor do documents."""
-    whole = hashlib.sha256()
-    top = os.path.join(ROOT, path)
-    names = [top] if os.path.isfile(top) else sorted(
-        os.path.join(folder, name) for folder, _, files in os.walk(top) for name in files if not name.endswith((".md", ".pyc")))
-    for name in names:
-        with open(name, "rb") as file:
-            content = file.read()
-        if name.endswith(CODE):
-            lines = (line.strip() for line in content.decode().splitlines())
-            content = "\n".join(line for line in lines if line and not line.startswith(COMMENT)).encode()
-        whole.update(os.path.relpath(name, ROOT).encode() + b"\0" + content + b"\0")
-    return whole.hexdigest()[:16]
-
-
-def commit(folders):
-    """The commit that is checked out, with a plus where files in these folders differ from it."""
+def commit(paths):
+    """The commit that is checked out, with a plus where these files differ from it."""
     git = lambda *arguments: subprocess.run(["git", "-C", ROOT, *arguments], check=True, capture_output=True, text=True).stdout.strip()
-    changed = git("status", "--porcelain", "--", *folders)
+    changed = git("status", "--porcelain", "--", *paths)
     return git("rev-parse", "--short=10", "HEAD") + ("+" if changed else "")
 
 

@@ -11,6 +11,7 @@ import tables
 from scenes import ROOT
 
 MARKS = re.compile(r"<!-- figure ([a-z0-9-]+)\.([a-z0-9-]+) -->\n.*?<!-- end -->", re.DOTALL)
+BEGIN = "<!-- figure "
 NEVER = "This figure has not been measured yet: `make figures NAME=%s` does."
 
 
@@ -22,6 +23,8 @@ def expected():
         if path not in found:
             with open(path) as file:
                 text = file.read()
+            if len(MARKS.findall(text)) != text.count(BEGIN):
+                raise SyntaxError("%s has a mark of a figure that is not written `%sNAME.TABLE -->`, or has no end" % (path, BEGIN))
             found[path] = MARKS.sub(lambda match: between(*match.groups()), text)
     return found
 

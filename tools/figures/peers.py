@@ -9,7 +9,7 @@ import numpy as np
 
 def mitsuba(variant):
     """The module, set to a variant. LLVM is found where Debian has it."""
-    found = sorted(glob.glob("/usr/lib/*/libLLVM*.so.*"))
+    found = sorted(glob.glob("/usr/lib/*/libLLVM[-.]*so*"))
     if found:
         os.environ.setdefault("DRJIT_LIBLLVM_PATH", found[-1])
     import mitsuba as mi

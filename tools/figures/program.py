@@ -7,8 +7,9 @@ import tempfile
 
 import scenes
 
-# The noise of a reference is taken off relMSE; this share of it, which is how well it is known, stays (as in `fluxion bench`).
-KNOWN = 0.05
+
+class Failed(Exception):
+    """A command that has failed, with what it said."""
 
 
 def environment():
@@ -16,37 +17,43 @@ def environment():
     return {**os.environ, "VIRTUAL_ENV": sys.prefix}
 
 
-def call(*arguments):
-    """Runs a command, and returns what it prints on standard output."""
-    done = subprocess.run([scenes.FLUXION, *map(str, arguments)], check=False, capture_output=True, text=True, env=environment())
-    if done.returncode != 0:
-        sys.exit("fluxion %s\n%s" % (" ".join(map(str, arguments)), done.stderr))
-    return done.stdout
+def finished(*arguments):
+    """Runs a command: its exit code, output and messages. Ctrl-C reaches it, too, and it is given the time to save what it has."""
+    command = [scenes.FLUXION, *map(str, arguments)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment()) as process:
+        try:
+            output, messages = process.communicate()
+        except KeyboardInterrupt:
+            process.wait()
+            raise
+    return process.returncode, output, messages
 
 
-def with_statistics(*arguments):
+def call(*arguments, codes=(0,)):
+    """Runs a command that may end with these exit codes, and returns what it prints on standard output."""
+    code, output, messages = finished(*arguments)
+    if code not in codes:
+        raise Failed("fluxion %s\n%s" % (" ".join(map(str, arguments)), messages))
+    return output
+
+
+def with_statistics(*arguments, codes=(0,)):
     """Runs a command that writes figures with `--json`, and returns these."""
     with tempfile.TemporaryDirectory() as folder:
         stats = os.path.join(folder, "stats.json")
-        call(*arguments, "--json", stats, "-q")
+        call(*arguments, "--json", stats, "-q", codes=codes)
         with open(stats) as file:
             return json.load(file)
 
 
-def floored(relmse, floor):
-    """relMSE without the reference's own noise."""
-    return max(relmse - floor, KNOWN * floor)
-
-
 def errors(image, reference, floor):
-    """The four measures of an image. All of them are zero for the reference."""
-    measured = json.loads(call("compare", image, reference, "--json", "-"))
-    return four(measured, floor)
+    """The four measures of an image, all of them zero for the reference. The floor, its own relMSE, is a part of relMSE."""
+    return four(json.loads(call("compare", image, reference, "--json", "-")), floor)
 
 
 def four(measured, floor):
     return {
-        "relmse": floored(measured["relmse"], floor),
+        "relmse": measured["relmse"],
         "smape": measured["smape"],
         "flip": measured["flip"],
         "dissimilarity": 1 - measured["ms_ssim"],

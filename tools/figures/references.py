@@ -6,12 +6,12 @@ linear screened Poisson solution `l2`, whichever has less error for its time on 
 """
 import json
 import os
-import subprocess
 import time
 
 import numpy as np
 
 import exr
+import program
 import scenes
 
 # Far from the seeds of what is judged.
@@ -68,10 +68,11 @@ class Reference:
             image, stats = self.at("-half.exr"), self.at("-half.json")
             command = ["render", self.scene.path, "-o", image, "--json", stats, "--size", self.scene.size, "--method", method, "--spp", spp,
                        "--seed", seed, "--checkpoint", self.at(f"-{method}-{seed}.ckpt"), "--resume", "-q"]
-            done = subprocess.run([scenes.FLUXION, *map(str, command)], check=False)
-            if done.returncode == STOPPED:
+            code, _, messages = program.finished(*command)
+            if code == STOPPED:
                 raise KeyboardInterrupt
-            done.check_returncode()
+            if code != 0:
+                raise program.Failed(messages)
             images.append(exr.rgb(image))
             with open(stats) as file:
                 seconds += json.load(file)["seconds"]["render"]
@@ -83,7 +84,7 @@ class Reference:
         first, second = images
         exr.write(self.at(".exr"), (first + second) / 2)
         exr.write(self.at("_var.exr"), (first - second) ** 2 / 4)
-        self.state = {"method": method, "spp": spp, "seconds": self.seconds + seconds, "floor": floor(first, second)}
+        self.state = {"method": method, "spp": spp, "seconds": seconds, "floor": floor(first, second)}
         with open(self.at(".json.part"), "w") as file:
             json.dump(self.state, file)
         os.replace(self.at(".json.part"), self.at(".json"))
@@ -98,8 +99,8 @@ def floor(first, second):
 def make(public, folder, hours):
     """Continues the reference that has had the least time until all are good or the hours are over."""
     os.makedirs(folder, exist_ok=True)
-    wanted, target = scenes.load(public)
-    references = [Reference(scene, folder) for scene in wanted]
+    target = scenes.floor()
+    references = [Reference(scene, folder) for scene in scenes.load(public)]
     end = time.monotonic() + 3600 * hours
     while time.monotonic() < end:
         left = [reference for reference in references if reference.floor > target]

@@ -1,12 +1,16 @@
-"""Runs figures that are stale, cell by cell; an interrupted run goes on with the cells that are missing."""
+"""Runs figures, cell by cell; an interrupted run goes on with the cells that are missing."""
+import hashlib
 import importlib
 import json
 import os
+import shutil
+import sys
 import time
 from dataclasses import dataclass
 
 import figure
 import scenes
+import sources
 
 
 @dataclass(frozen=True)
@@ -36,32 +40,83 @@ class Context:
 def context(public, work):
     here = lambda name: os.path.join(os.path.abspath(work), name)
     public = os.path.abspath(public) if public else ""
-    return Context(scenes.load(public)[0], public, here("references"), here("mitsuba"), here("runs"))
+    return Context(scenes.load(public), public, here("references"), here("mitsuba"), here("runs"))
 
 
 def run(one, where):
     """Measures a figure and stores it."""
-    measure = importlib.import_module("measures." + one["measure"].replace("-", "_"))
-    cells = measure.cells(one["run"], where)
-    name = "%s-%s" % (one.name, figure.digest_of_text(json.dumps(one.inputs(), sort_keys=True)))
-    folder = os.path.join(where.work, name)
+    measure = importlib.import_module("measures." + one["measure"])
+    head, known = one.head(), {}
+    require(one.name, "scene", [name for name in one.sizes() if name not in {scene.name for scene in where.scenes}])
+    if measure.REFERENCES:
+        require(one.name, "reference", [name for name in one.sizes() if not os.path.exists(os.path.join(where.references, name + ".json"))])
+        known = {name: where.reference(name)[1] for name in one.sizes()}
+    head, runs, seconds = measured(one.name, measure, one["run"], where, {**head, "references": known})
+    del head["references"]
+    one.save(head, runs, seconds)
+    forget(one.name, where)
+
+
+def require(name, what, missing):
+    if missing:
+        sys.exit("figure %s needs the %s of %s: give the folder of public scenes as SCENES to `make references` and `make figures`"
+                 % (name, what, ", ".join(missing)))
+
+
+def measured(name, measure, run, where, head):
+    """All runs of a measure, with the head that was written down when they were begun and the seconds that they took. Cells that were
+    measured by the same program on the same machine before an interruption are not measured again."""
+    decides = {key: value for key, value in head.items() if key not in ("commit", "date")}
+    folder = os.path.join(where.work, "%s-%s" % (name, sources.of_text(json.dumps([decides, run, program_digest()], sort_keys=True))))
     os.makedirs(folder, exist_ok=True)
+    head = first_head(os.path.join(folder, "head.json"), head)
     path = os.path.join(folder, "cells.jsonl")
-    done = {}
-    if os.path.exists(path):
-        with open(path) as file:
-            for line in file:
-                entry = json.loads(line)
-                done[json.dumps(entry["cell"])] = entry
+    done = {json.dumps(entry["cell"]): entry for entry in entries(path)}
+    cells = measure.cells(run, where)
     for number, cell in enumerate(cells):
         key = json.dumps(cell)
         if key in done:
             continue
-        print("%s: %d of %d, %s" % (one.name, number + 1, len(cells), " ".join(map(str, cell))), flush=True)
+        print("%s: %d of %d, %s" % (name, number + 1, len(cells), " ".join(map(str, cell))), flush=True)
         start = time.monotonic()
-        runs = measure.measure(cell, one["run"], where, folder)
+        runs = measure.measure(cell, run, where, folder)
         done[key] = {"cell": cell, "seconds": round(time.monotonic() - start, 2), "runs": runs}
         with open(path, "a") as file:
             file.write(json.dumps(done[key]) + "\n")
-    entries = [done[json.dumps(cell)] for cell in cells]
-    one.save([entry for all_of in entries for entry in all_of["runs"]], sum(entry["seconds"] for entry in entries))
+    wanted = [done[json.dumps(cell)] for cell in cells]
+    return head, [one for entry in wanted for one in entry["runs"]], sum(entry["seconds"] for entry in wanted)
+
+
+def forget(name, where):
+    """Removes what was kept of interrupted measurements."""
+    for folder in os.listdir(where.work):
+        if folder.rpartition("-")[0] == name:
+            shutil.rmtree(os.path.join(where.work, folder))
+
+
+def first_head(path, head):
+    """The head that is stored, or else this one, stored."""
+    if not os.path.exists(path):
+        with open(path + ".part", "w") as file:
+            json.dump(head, file)
+        os.replace(path + ".part", path)
+    with open(path) as file:
+        return json.load(file)
+
+
+def entries(path):
+    """Cells that are done. The last line may be torn where a machine went down."""
+    found = []
+    if os.path.exists(path):
+        with open(path) as file:
+            for line in file:
+                try:
+                    found.append(json.loads(line))
+                except json.JSONDecodeError:
+                    break
+    return found
+
+
+def program_digest():
+    with open(scenes.FLUXION, "rb") as file:
+        return hashlib.sha256(file.read()).hexdigest()

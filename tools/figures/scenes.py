@@ -1,4 +1,4 @@
-"""The scenes of figures/scenes.toml, and folders of what is measured."""
+"""The scenes of figures/scenes.toml, and where the program is."""
 import os
 import tomllib
 from dataclasses import dataclass
@@ -20,15 +20,30 @@ class Scene:
         return tuple(int(number) for number in self.size.split("x"))
 
 
-def load(public):
-    """All scenes, and the floor that references should have. `public` is the folder of public scenes; without one these are left
-    out."""
+def table():
     with open(os.path.join(ROOT, "figures", "scenes.toml"), "rb") as file:
-        table = tomllib.load(file)
-    folders = [("bundled", os.path.join(ROOT, "scenes"))] + ([("public", public)] if public else [])
-    scenes = [
-        Scene(name, os.path.join(folder, name, "scene.xml"), size)
-        for group, folder in folders
-        for name, size in table[group].items()
-    ]
-    return scenes, table["reference"]["floor"]
+        return tomllib.load(file)
+
+
+def sizes():
+    """Names and sizes of all scenes."""
+    groups = table()
+    return {**groups["bundled"], **groups["public"]}
+
+
+def bundled():
+    """Names of the scenes in the repository."""
+    return list(table()["bundled"])
+
+
+def floor():
+    """The floor that references should have."""
+    return table()["reference"]["floor"]
+
+
+def load(public):
+    """The scenes that are there. `public` is the folder of public scenes; without one these are left out."""
+    inside = bundled()
+    folder = lambda name: os.path.join(ROOT, "scenes") if name in inside else public
+    scenes = [Scene(name, os.path.join(folder(name), name, "scene.xml"), size) for name, size in sizes().items() if folder(name)]
+    return [scene for scene in scenes if os.path.exists(scene.path)]

@@ -6,6 +6,10 @@ import statistics
 MEASURES = {"relmse": "relMSE", "smape": "SMAPE", "flip": "FLIP", "dissimilarity": "1 - MS-SSIM"}
 # Reference noise above this share of a scene's smallest relMSE shows in the other measures, from which it cannot be taken off.
 CLEAN = 0.1
+# The share of a reference's noise that is still there after it has been taken off relMSE: how well that noise is known.
+KNOWN = 0.05
+# Ratios of relMSE are of errors that are at least this share of the noise that was taken off them.
+USABLE = 0.5
 
 
 def table(specification, runs):
@@ -27,7 +31,7 @@ def geometric(values):
 
 
 class Errors:
-    """Means over seeds by budget, scene and candidate."""
+    """Means over seeds by budget, scene and candidate; relMSE with the reference's own noise taken off."""
 
     def __init__(self, runs, candidate):
         self.runs, self.of = runs, {}
@@ -36,7 +40,9 @@ class Errors:
             key = run["budget"], run["scene"], candidate(run)
             collected.setdefault(key, []).append(run)
         for key, same in collected.items():
-            self.of[key] = {name: statistics.fmean(run[name] for run in same) for name in (*MEASURES, "spp", "seconds", "floor")}
+            means = {name: statistics.fmean(run[name] for run in same) for name in (*MEASURES, "spp", "floor")}
+            means["relmse"] = max(means["relmse"] - means["floor"], KNOWN * means["floor"])
+            self.of[key] = means
         self.budgets = unique(budget for budget, _, _ in self.of)
         self.scenes = unique(scene for _, scene, _ in self.of)
 
@@ -44,6 +50,13 @@ class Errors:
         """Whether the scene's reference is good enough for measures that its noise cannot be taken off."""
         here = [values for (b, s, _), values in self.of.items() if (b, s) == (budget, scene)]
         return here[0]["floor"] <= CLEAN * min(values["relmse"] for values in here)
+
+    def usable(self, measure, budget, scene, candidates):
+        """Whether ratios of a measure mean something on a scene."""
+        if measure != "relmse":
+            return self.clean(budget, scene)
+        here = [self.of[budget, scene, candidate] for candidate in candidates]
+        return all(values["relmse"] >= USABLE * values["floor"] for values in here)
 
     def has(self, budget, scene, *candidates):
         return all((budget, scene, candidate) in self.of for candidate in candidates)
@@ -62,17 +75,16 @@ def ratios(specification, runs):
     rows = []
     for budget in specification.get("budgets", errors.budgets):
         scenes = [scene for scene in errors.scenes if errors.has(budget, scene, baseline, *candidates)]
-        clean = [scene for scene in scenes if errors.clean(budget, scene)]
+        counted = {measure: [scene for scene in scenes if errors.usable(measure, budget, scene, [*candidates, baseline])] for measure in MEASURES}
         for candidate in candidates:
-            cells, better = [], 0
+            cells, better = [], []
             for measure in MEASURES:
-                counted = scenes if measure == "relmse" else clean
-                of = [errors.of[budget, scene, candidate][measure] / errors.of[budget, scene, baseline][measure] for scene in counted]
+                of = [errors.of[budget, scene, candidate][measure] / errors.of[budget, scene, baseline][measure] for scene in counted[measure]]
                 cells += ["%.2f" % geometric(of), "%.2f" % max(of)] if of else ["-", "-"]
-                better += bool(of) and geometric(of) < 1
-            spp = geometric(errors.of[budget, scene, candidate]["spp"] for scene in scenes)
-            rows.append([budget, "`%s`" % candidate, *cells, "-" if candidate == baseline else "%d of 4" % better, "%.0f" % spp])
-        rows[-len(candidates)][0] += " (%d scenes, %d)" % (len(scenes), len(clean))
+                better += [geometric(of) < 1] if of else []
+            spp = "%.0f" % geometric(errors.of[budget, scene, candidate]["spp"] for scene in scenes) if scenes else "-"
+            rows.append([budget, "`%s`" % candidate, *cells, "-" if candidate == baseline else "%d of %d" % (sum(better), len(better)), spp])
+        rows[-len(candidates)][0] += " (%d scenes, %d)" % (len(counted["relmse"]), len(counted["smape"]))
         for row in rows[1 - len(candidates):] if len(candidates) > 1 else []:
             row[0] = ""
     return markdown(header, rows)
@@ -113,12 +125,15 @@ def rows(specification, runs):
             values = [amount(column["value"], [run for run in runs if run[key] == name], combine) for name in unique(run[key] for run in runs)]
             last.append(column["format"] % geometric(values) if keep else "")
         lines.append(["geometric mean", *last])
-    return markdown([specification.get("head", key), *(column["name"] for column in columns)], lines)
+    return markdown([key, *(column["name"] for column in columns)], lines)
+
+
+SIGNS = {" / ": lambda a, b: a / b, " - ": lambda a, b: a - b}
 
 
 def amount(value, same, combine):
-    """The value of an expression such as `a`, `a / b` or `a * b`."""
-    for sign, joined in ((" / ", lambda a, b: a / b), (" * ", lambda a, b: a * b)):
+    """The value of an expression such as `a`, `a / b` or `a - b`."""
+    for sign, joined in SIGNS.items():
         if sign in value:
             return joined(*(amount(part, same, combine) for part in value.split(sign)))
     return combine([run[value] for run in same])
@@ -126,7 +141,7 @@ def amount(value, same, combine):
 
 def show(column, same, combine):
     if column["value"] not in same[0]:
-        if any(sign in column["value"] for sign in (" / ", " * ")):
+        if any(sign in column["value"] for sign in SIGNS):
             return column["format"] % amount(column["value"], same, combine)
         return "-"
     first = same[0][column["value"]]

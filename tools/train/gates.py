@@ -9,7 +9,6 @@ openimageio and pyoidn, and `cargo build --release`.
 import argparse
 import os
 import sys
-import tempfile
 
 TOOLS = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..")
 sys.path[:0] = [TOOLS, os.path.join(TOOLS, "figures")]
@@ -28,9 +27,10 @@ def failures(errors):
     found = []
     for budget, scene, method in errors.of:
         for measure in tables.MEASURES:
-            if method not in LEARNED or (measure != "relmse" and not errors.clean(budget, scene)):
+            rivals = LEARNED.get(method)
+            if not rivals or not errors.usable(measure, budget, scene, [method, *rivals]):
                 continue
-            best = min(errors.of[budget, scene, rival][measure] for rival in LEARNED[method])
+            best = min(errors.of[budget, scene, rival][measure] for rival in rivals)
             ratio = errors.of[budget, scene, method][measure] / best
             if ratio > LARGEST:
                 found.append("%s on %s with %s: %.2f in %s" % (method, scene, budget, ratio, tables.MEASURES[measure]))
@@ -41,8 +41,8 @@ def main(options):
     where = runner.context(options.scenes, options.work)
     variants = [{"label": "", "options": ["--method", "l2"]}]
     run = {"spp": [int(spp) for spp in options.spp.split(",")], "seeds": options.seeds, "methods": METHODS, "variants": variants}
-    with tempfile.TemporaryDirectory() as folder:
-        runs = [one for cell in samples.cells(run, where) for one in samples.measure(cell, run, where, folder)]
+    floors = {scene.name: where.reference(scene.name)[1] for scene in where.scenes}
+    _, runs, _ = runner.measured("gates", samples, run, where, {"references": floors})
     print(tables.table({"form": "ratios", "baseline": "frgr"}, runs))
     found = failures(tables.Errors(runs, lambda run: run["method"]))
     if found:

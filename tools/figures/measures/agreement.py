@@ -6,7 +6,10 @@ import numpy as np
 import exr
 import peers
 import program
+import scenes
 from scenes import ROOT
+
+REFERENCES = False
 
 # Their smaller sides keep Mitsuba's renders short.
 BUNDLED_SIZE, SMALL_SIZE = "64x48", "32x24"
@@ -14,7 +17,7 @@ BUNDLED_SIZE, SMALL_SIZE = "64x48", "32x24"
 
 def cells(run, where):
     """Kind and name of every scene."""
-    bundled = ["cornell-box", "door-ajar", "glossy-metal", "glass-caustic"]
+    bundled = scenes.bundled()
     unit = os.path.join(ROOT, "scenes", "unit")
     bundled += ["unit/" + name for name in sorted(os.listdir(unit)) if os.path.exists(os.path.join(unit, name, "scene.xml"))]
     public = [scene.name for scene in where.scenes if where.public and scene.path.startswith(where.public)]
@@ -82,4 +85,7 @@ def stored(where, name):
         mean, variance = peers.mean_and_variance(scene.path, scene.width_and_height, 256)
         exr.write(path + ".exr", mean)
         exr.write(path + "_var.exr", variance)
-    return exr.rgb(path + ".exr"), exr.rgb(path + "_var.exr")
+    mean, variance = exr.rgb(path + ".exr"), exr.rgb(path + "_var.exr")
+    if mean.shape[1::-1] != where.scene(name).width_and_height:
+        raise program.Failed("%s.exr has another size than figures/scenes.toml says: remove it" % path)
+    return mean, variance

@@ -1,8 +1,11 @@
 """Errors within budgets of time or samples, each run by itself: `fluxion bench`."""
 import json
 import os
+import re
 
 import program
+
+REFERENCES = True
 
 
 def cells(run, where):
@@ -18,7 +21,18 @@ def measure(cell, run, where, folder):
                  where.reference(scene.name)[0], "-o", output, "--resume", "-q")
     with open(os.path.join(output, "results.json")) as file:
         results = json.load(file)
+    for left_out in results["left_out"]:
+        print("%(scene)s, %(method)s, %(budget)s was left out: %(reason)s" % left_out, flush=True)
+    expected = len(run["methods"]) * len(run.get("times", run.get("spp"))) * run["seeds"]
+    if len(results["records"]) + len(results["left_out"]) * run["seeds"] < expected:
+        raise program.Failed("fluxion bench has stopped before its end on %s" % scene.name)
     return [entry(record) for record in results["records"]]
+
+
+def image(folder, scene, method, budget):
+    """The file of the image that `fluxion bench` keeps of the first seed."""
+    name = "%s-%s-%s" % (scene, method, budget)
+    return os.path.join(folder, scene, "images", re.sub(r"[^A-Za-z0-9.-]", "_", name) + ".exr")
 
 
 def entry(record):

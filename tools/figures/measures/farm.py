@@ -1,10 +1,12 @@
 """Processor time of a render in one go over that of its chunks with their merge."""
 import os
 import resource
-import shutil
+import tempfile
 
 import program
 from scenes import ROOT
+
+REFERENCES = False
 
 SCENE = os.path.join(ROOT, "scenes", "cornell-box", "scene.xml")
 
@@ -23,16 +25,17 @@ def processor_time(work):
 def measure(cell, run, where, folder):
     chunks, turn = cell
     options = ["--size", run["size"], "--method", "l2"]
-    checkpoint, job = os.path.join(folder, "one.ckpt"), os.path.join(folder, "job")
 
-    def in_chunks():
+    def in_chunks(job):
         program.call("job", "plan", SCENE, "--spp", run["spp"], "--chunks", chunks, "-o", job, "--", *options, "-q")
         for chunk in range(chunks):
             program.call("job", "run", job, chunk)
         program.call("job", "merge", job, "--no-image")
 
-    whole = processor_time(lambda: program.call("render", SCENE, "--spp", run["spp"], *options, "-q", "--checkpoint", checkpoint))
-    parts = processor_time(in_chunks)
-    os.remove(checkpoint)
-    shutil.rmtree(job)
+    def in_one(checkpoint):
+        program.call("render", SCENE, "--spp", run["spp"], *options, "-q", "--checkpoint", checkpoint)
+
+    with tempfile.TemporaryDirectory(dir=folder) as below:
+        whole = processor_time(lambda: in_one(os.path.join(below, "one.ckpt")))
+        parts = processor_time(lambda: in_chunks(os.path.join(below, "job")))
     return [{"chunks": chunks, "turn": turn, "whole": whole, "parts": parts}]

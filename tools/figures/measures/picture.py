@@ -1,30 +1,26 @@
-"""The picture of the README: the same scene after the same time, by several programs."""
+"""The picture of the README: the same scene after the same time, by several programs, beside its reference."""
 import os
 
 import numpy as np
 
 import exr
 import figure
-import program
+from measures import bench
 
+REFERENCES = True
 GAP = 4
 
 
 def cells(run, where):
-    return [[label] for label in run["methods"]]
+    return [[run["scene"]]]
 
 
 def measure(cell, run, where, folder):
-    """The panel of a method; the last one puts the picture together, with the reference."""
-    label = cell[0]
-    scene, (reference, floor) = where.scene(run["scene"]), where.reference(run["scene"])
-    path = lambda name: os.path.join(folder, name + ".exr")
-    stats = program.with_statistics("render", scene.path, "-o", path(label), "--size", scene.size, "--method", run["methods"][label],
-                                    *(["--time", run["time"]]), *run["options"].get(label, []))
-    if label == list(run["methods"])[-1]:
-        panels = [exr.rgb(path(name)) for name in run["methods"]] + [exr.rgb(reference)]
-        exr.write(os.path.join(figure.RESULTS, run["file"]), joined([shown(crop(image, run["crop"])) for image in panels]), exr.EIGHT_BIT)
-    return [{"image": label, "method": run["methods"][label], "spp": stats["spp"], **program.errors(path(label), reference, floor)}]
+    runs = bench.measure(cell, run, where, folder)
+    files = [bench.image(folder, run["scene"], method, run["times"][0]) for method in run["methods"]]
+    panels = [exr.rgb(file) for file in (*files, where.reference(run["scene"])[0])]
+    exr.write(os.path.join(figure.RESULTS, run["file"]), joined([shown(crop(image, run["crop"])) for image in panels]), exr.EIGHT_BIT)
+    return runs
 
 
 def crop(image, window):

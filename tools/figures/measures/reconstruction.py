@@ -3,6 +3,8 @@ import os
 
 import program
 
+REFERENCES = False
+
 
 def cells(run, where):
     return [[method, turn] for turn in range(run["rounds"]) for method in run["methods"]]

@@ -3,6 +3,8 @@ import os
 
 import program
 
+REFERENCES = True
+
 
 def cells(run, where):
     """Scenes, seeds, samples per pixel, and labels of variants of the render."""

@@ -7,6 +7,8 @@ import exr
 import program
 from scenes import ROOT
 
+REFERENCES = False
+
 
 def cells(run, where):
     return [[name] for name in run["scenes"]]
