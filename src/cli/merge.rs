@@ -15,8 +15,9 @@ use super::terminal::out;
 /// Options of `merge`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Checkpoints of the same scene with other samples, by --seed or --first; or references with other seeds
-    #[arg(required = true, num_args = 2.., value_name = "CHECKPOINT")]
+    /// Checkpoints of the same scene with other samples, by --seed or --first; or references with other seeds. Of a single
+    /// checkpoint the layers can be written
+    #[arg(required = true, value_name = "CHECKPOINT")]
     films: Vec<PathBuf>,
     /// Checkpoint of all samples to write, or its layers if the name ends in .exr; the reference of all samples
     #[arg(short, long, value_name = "FILE")]

@@ -133,18 +133,22 @@ fn the_program_tells_what_it_knows() {
 fn a_report_says_everything_but_where_files_are() {
     let folder = tempfile::tempdir().unwrap();
     let (scenes, elsewhere) = (folder.path().join("of John Doe"), folder.path().join("else where"));
-    [&scenes, &elsewhere].map(|folder| std::fs::create_dir(folder).unwrap());
-    std::fs::write(elsewhere.join("ball.obj"), "v 0 0 0\n").unwrap();
+    for folder in [&scenes, &elsewhere] {
+        std::fs::create_dir(folder).unwrap();
+    }
+    let uneven =
+        "<shape type=\"sphere\"><transform name=\"to_world\"><scale x=\"1\" y=\"2\" z=\"1\"/></transform></shape>";
+    std::fs::write(elsewhere.join("ball.xml"), format!("<scene version=\"3.0.0\">{uneven}</scene>")).unwrap();
     let text = format!(
         "<scene version=\"3.0.0\"><sensor type=\"perspective\"><film type=\"hdrfilm\"><float name=\"exposure\" value=\"1\"/>\
-         </film></sensor><shape type=\"sphere\"/><shape type=\"obj\"><string name=\"filename\" value=\"{}\"/></shape></scene>",
-        elsewhere.join("ball.obj").display()
+         </film></sensor><include filename=\"{}\"/></scene>",
+        elsewhere.join("ball.xml").display()
     );
     std::fs::write(scenes.join("odd room.xml"), text).unwrap();
     let output = fluxion(folder.path()).args(["info", "--report"]).arg(scenes.join("odd room.xml")).output().unwrap();
     let (text, error) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
     assert!(output.status.success(), "{error}");
-    let warnings = ["warning      odd room.xml:1: the film's `exposure`", "warning      ball.obj"];
+    let warnings = ["warning      odd room.xml:1: the film's `exposure`", "warning      ball.xml:1: a sphere"];
     for expected in ["epoch 1 of samples", "threads", "Embree", "fingerprint", "gradients"].into_iter().chain(warnings)
     {
         assert!(text.contains(expected), "{expected}: {text}");
@@ -152,6 +156,20 @@ fn a_report_says_everything_but_where_files_are() {
     for private in ["John", "Doe", "else where", &*folder.path().to_string_lossy()] {
         assert!(!text.contains(private) && !error.contains(private), "{text}\n{error}");
     }
+}
+
+#[test]
+fn budgets_that_end_before_their_target_say_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let render = |target: &str| {
+        let arguments = ["--size", "32x32", "--spp", "32", "--target-error", target, "-o", "image.exr"];
+        let output = fluxion(folder.path()).args(["render", &scene("cornell-box")]).args(arguments).output().unwrap();
+        assert!(output.status.success());
+        String::from_utf8_lossy(&output.stderr).into_owned()
+    };
+    let (missed, met) = (render("1e-9"), render("10"));
+    assert!(missed.contains("warning: the run ended at an estimated relMSE of"), "{missed}");
+    assert!(missed.contains("above the target of 1e-9") && !met.contains("warning"), "{missed}{met}");
 }
 
 #[test]

@@ -66,11 +66,19 @@ fn chunks_make_the_image_of_one_render() {
     }
     expect(at, &["job", "run", "j", "2"], 0, "chunk 2 is complete");
     expect(at, &["job", "run", "j", "8"], 2, "there are 8, from 0 on");
+    expect(at, &["job", "run", "j", "2-"], 2, "chunks are written as in 7 or 3,17,200-203");
+    expect(at, &["job", "run", "j", "2,5-6,8"], 2, "there are 8, from 0 on");
     expect(at, &["job", "status", "j"], 0, "missing: 7");
     expect(at, &["job", "merge", "j", "--no-image"], 2, "chunks 7 of glossy-metal");
     expect(at, &["job", "merge", "j", "--partial"], 0, "3 chunks");
-    expect(at, &["job", "run", "j", "7"], 0, "");
+    expect(at, &["job", "run", "j", "6-7"], 0, "");
     expect(at, &["job", "merge", "j"], 0, "glossy-metal.exr");
+    expect(
+        at,
+        &["merge", "j/glossy-metal.ckpt", "-o", "layers.exr"],
+        0,
+        "layers.exr: 44.0 samples per pixel of 4 runs",
+    );
     for (name, scene) in [("cornell-box", &cornell), ("glossy-metal", &metal)] {
         let all = ["render", scene, "--spp", "44", "--checkpoint", "all.ckpt"];
         expect(at, &[&all[..], &options[..]].concat(), 0, "");

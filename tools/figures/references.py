@@ -97,7 +97,7 @@ def floor(first, second):
 
 
 def make(public, folder, hours):
-    """Continues the reference that has had the least time until all are good or the hours are over."""
+    """Continues the reference that has the most noise for the time that it has had, until all are good or the hours are over."""
     os.makedirs(folder, exist_ok=True)
     target = scenes.floor()
     references = [Reference(scene, folder) for scene in scenes.load(public)]
@@ -106,7 +106,7 @@ def make(public, folder, hours):
         left = [reference for reference in references if reference.floor > target]
         if not left:
             break
-        reference = min(left, key=lambda reference: reference.seconds)
+        reference = max(left, key=lambda reference: reference.floor / max(reference.seconds, 1e-9))
         reference.go_on()
         print("%s: %s, %d samples in each half, %.0f s, floor %.1e" % (
             reference.scene.name, reference.state["method"], reference.state["spp"], reference.seconds, reference.floor), flush=True)

@@ -3,6 +3,7 @@
 mod plan;
 mod status;
 
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -15,6 +16,9 @@ use super::host::{hosted, watched};
 use super::terminal::{note, out};
 use super::{interrupt, progress};
 
+/// End of a chunk that a signal has reached.
+const STOPPED: &str = "was stopped, and is saved";
+
 /// Options of `job`.
 #[derive(clap::Args)]
 pub struct Args {
@@ -26,12 +30,13 @@ pub struct Args {
 enum Command {
     /// Divide renders into chunks: job.json, commands.txt with a command for each, slurm.sh and openjd.yaml
     Plan(plan::Args),
-    /// Render a chunk, unless it is complete; go on with it if it was interrupted
+    /// Render chunks, unless they are complete; go on with those that were interrupted
     Run {
         /// Folder of the job
         job: PathBuf,
-        /// Number of the chunk, from 0 on
-        chunk: usize,
+        /// Numbers of the chunks, from 0 on, as in 7 or 3,17,200-203
+        #[arg(value_parser = parse_chunks, value_name = "CHUNKS")]
+        chunks: Chunks,
     },
     /// Allocate the samples of an adaptive job's second round, when the first is complete
     Allocate {
@@ -57,30 +62,54 @@ enum Command {
 pub fn run(args: &Args) -> Result<ExitCode> {
     match &args.command {
         Command::Plan(args) => plan::run(args),
-        Command::Run { job, chunk } => render(job, *chunk),
+        Command::Run { job, chunks } => render(job, chunks),
         Command::Allocate { job } => allocate(job),
         Command::Status(args) => status::run(args),
         Command::Merge { job, partial, no_image } => merge(job, *partial, !no_image),
     }
 }
 
-fn render(folder: &Path, number: usize) -> Result<ExitCode> {
+/// Numbers of chunks, as `job status --missing` prints them.
+#[derive(Clone)]
+struct Chunks(Vec<RangeInclusive<usize>>);
+
+fn parse_chunks(text: &str) -> Result<Chunks, String> {
+    let number = |text: &str| text.trim().parse().map_err(|_| "chunks are written as in 7 or 3,17,200-203".to_owned());
+    let range = |part: &str| match part.split_once('-') {
+        Some((first, last)) => Ok(number(first)?..=number(last)?),
+        None => number(part).map(|only| only..=only),
+    };
+    text.split(',').map(range).collect::<Result<_, String>>().map(Chunks)
+}
+
+/// Renders chunks one after the other, until one is stopped.
+fn render(folder: &Path, chunks: &Chunks) -> Result<ExitCode> {
     let job = Job::load(folder)?;
+    for number in chunks.0.iter().flat_map(Clone::clone) {
+        if !is_rendered(&job, number)? {
+            break;
+        }
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Renders a chunk; false if that was stopped.
+fn is_rendered(job: &Job, number: usize) -> Result<bool> {
     let part = job.unfinished(number);
     say_what_is_kept(format!("; the last checkpoint, if there was time for one, is kept in {}", part.display()));
     let (chunk, stats, what) = match hosted(&[], |_| true, |host| job.run(number, host))?? {
         ChunkEnd::Complete => {
             note!("chunk {number} is complete");
-            return Ok(ExitCode::SUCCESS);
+            return Ok(true);
         }
         ChunkEnd::Rendered(chunk, stats) => (chunk, stats, "is complete"),
-        ChunkEnd::Stopped(chunk, stats) => (chunk, stats, "was stopped, and is saved"),
+        ChunkEnd::Stopped(chunk, stats) => (chunk, stats, STOPPED),
     };
     interrupt::saved();
     let seconds = progress::seconds(std::time::Duration::from_secs_f64(stats.seconds.render));
     let (name, first) = (job.name(chunk.image), chunk.first);
     out!("chunk {number} {what}: {} samples per pixel of {name} from number {first} on, in {seconds}", stats.spp)?;
-    Ok(ExitCode::SUCCESS)
+    Ok(what != STOPPED)
 }
 
 fn allocate(folder: &Path) -> Result<ExitCode> {

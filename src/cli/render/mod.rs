@@ -19,7 +19,7 @@ use fluxion::render::{self, FilmSink, SampleId};
 use fluxion::scene::Scene;
 
 pub use self::sampling::allocator_names;
-use super::host::hosted;
+use super::host::{hosted, warn};
 use super::outputs::Claims;
 use super::viewer::Viewer;
 use super::{checkpoint, interrupt, machine, method, progress};
@@ -133,6 +133,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         }
     })??;
     args.outputs.json.write(&stats)?;
+    tell_unreached(recipe.limits.error, &stats);
     report(&stats);
     Ok(ExitCode::SUCCESS)
 }
@@ -169,6 +170,14 @@ fn tell_rejected(args: &Args, rendered: &Rendered) {
     note!("replay the first sample that was not finite with:");
     let (file, shift, options) = (args.scene.display(), args.differences.as_text(), args.options.as_text());
     note!("  fluxion render {file} --seed {seed}{shift}{options} --replay {x},{y},{index}");
+}
+
+/// Warns where the budget has ended before the error was as small as it was to be.
+fn tell_unreached(target: Option<f64>, stats: &Stats) {
+    let (Some(target), Some(error)) = (target, stats.passes.last().and_then(|pass| pass.error)) else { return };
+    if error > target {
+        warn(&format!("the run ended at an estimated relMSE of {error:.2e}, above the target of {target:e}"));
+    }
 }
 
 /// Says how long everything took.
