@@ -1,11 +1,16 @@
 """References of the scenes of figures/scenes.toml.
 
 A reference is the mean of two halves with seeds of their own, NAME.exr; half of their difference, squared, is the variance of that mean,
-NAME_var.exr, as `fluxion bench` takes it. Each half is one render that is continued from its checkpoint, by path tracing or by the
-linear screened Poisson solution `l2`, whichever has less error for its time on the scene. Both are unbiased; nothing is denoised.
+NAME_var.exr, as `fluxion bench` takes it. Each half is one render that is continued from its checkpoint, by path tracing or with differences,
+whichever has less error for its time on the scene.
+
+With differences, a half is a mean of its path-traced image and of the linear screened Poisson solution `l2`, which spreads the noise of bright
+outlines over what is beside them. The weights of each half come from the other one, which is independent of it. So everything is
+unbiased; nothing is denoised.
 """
 import json
 import os
+import tempfile
 import time
 
 import numpy as np
@@ -63,22 +68,26 @@ class Reference:
 
     def halves(self, method, spp):
         """Both images, and the seconds of all their samples."""
-        images, seconds = [], 0.0
-        for seed in SEEDS:
-            image, stats = self.at("-half.exr"), self.at("-half.json")
-            command = ["render", self.scene.path, "-o", image, "--json", stats, "--size", self.scene.size, "--method", method, "--spp", spp,
-                       "--seed", seed, "--checkpoint", self.at(f"-{method}-{seed}.ckpt"), "--resume", "-q"]
-            code, _, messages = program.finished(*command)
+        rendered = [self.half(method, spp, seed) for seed in SEEDS]
+        first, second = (half for half, _ in rendered)
+        images = [first.image, second.image] if method == "primal" else [first.mixed_by(second), second.mixed_by(first)]
+        return images, sum(seconds for _, seconds in rendered)
+
+    def half(self, method, spp, seed):
+        """Continues a half, and reads it; the seconds of its samples."""
+        checkpoint = self.at(f"-{method}-{seed}.ckpt")
+        with tempfile.TemporaryDirectory() as folder:
+            image, stats, layers = (os.path.join(folder, name) for name in ("image.exr", "stats.json", "layers.exr"))
+            code, _, messages = program.finished(
+                "render", self.scene.path, "-o", image, "--json", stats, "--size", self.scene.size, "--method", method, "--spp", spp,
+                "--seed", seed, "--checkpoint", checkpoint, "--resume", "-q")
             if code == STOPPED:
                 raise KeyboardInterrupt
             if code != 0:
                 raise program.Failed(messages)
-            images.append(exr.rgb(image))
+            program.call("merge", checkpoint, "-o", layers, "-q")
             with open(stats) as file:
-                seconds += json.load(file)["seconds"]["render"]
-            os.remove(image)
-            os.remove(stats)
-        return images, seconds
+                return Half(exr.rgb(image), exr.everything(layers)), json.load(file)["seconds"]["render"]
 
     def save(self, method, spp, images, seconds):
         first, second = images
@@ -88,6 +97,34 @@ class Reference:
         with open(self.at(".json.part"), "w") as file:
             json.dump(self.state, file)
         os.replace(self.at(".json.part"), self.at(".json"))
+
+
+class Half:
+    """The image of a method, and what was sampled for it."""
+
+    def __init__(self, image, layers):
+        rgb = lambda prefix: np.stack([layers[prefix + channel] for channel in "RGB"], -1)
+        self.image, self.sampled = image, rgb("") + rgb("direct.")
+        self.variance = rgb("variance.") + rgb("direct_variance.")
+
+    def solution_share(self):
+        """Where the solution is good: by the variance of the sampled colours over its squared distance from them, in 3x3 pixels.
+        Both are unbiased, so what the distance has beyond that variance is the solution's own."""
+        relative = lambda values: around((values / (self.image ** 2 + 0.01)).mean(-1))
+        own = relative(self.variance)
+        return (own / np.maximum(relative((self.image - self.sampled) ** 2), own + 1e-20))[..., None]
+
+    def mixed_by(self, other):
+        """Solution and sampled colours, by shares that are independent of both."""
+        share = other.solution_share()
+        return share * self.image + (1 - share) * self.sampled
+
+
+def around(values):
+    """Means over 3x3 pixels; at the border those of the pixels that are there."""
+    padded = np.pad(values, 1, mode="edge")
+    height, width = values.shape
+    return sum(padded[y:y + height, x:x + width] for y in range(3) for x in range(3)) / 9
 
 
 def floor(first, second):

@@ -8,7 +8,7 @@ MEASURES = {"relmse": "relMSE", "smape": "SMAPE", "flip": "FLIP", "dissimilarity
 CLEAN = 0.1
 # The share of a reference's noise that is still there after it has been taken off relMSE: how well that noise is known.
 KNOWN = 0.05
-# Ratios of relMSE are of errors that are at least this share of the noise that was taken off them.
+# Ratios are of errors that are at least this share of the reference's noise: of relMSE after it was taken off.
 USABLE = 0.5
 
 
@@ -51,10 +51,8 @@ class Errors:
         here = [values for (b, s, _), values in self.of.items() if (b, s) == (budget, scene)]
         return here[0]["floor"] <= CLEAN * min(values["relmse"] for values in here)
 
-    def usable(self, measure, budget, scene, candidates):
-        """Whether ratios of a measure mean something on a scene."""
-        if measure != "relmse":
-            return self.clean(budget, scene)
+    def usable(self, budget, scene, candidates):
+        """Whether ratios of errors mean something on a scene."""
         here = [self.of[budget, scene, candidate] for candidate in candidates]
         return all(values["relmse"] >= USABLE * values["floor"] for values in here)
 
@@ -75,16 +73,18 @@ def ratios(specification, runs):
     rows = []
     for budget in specification.get("budgets", errors.budgets):
         scenes = [scene for scene in errors.scenes if errors.has(budget, scene, baseline, *candidates)]
-        counted = {measure: [scene for scene in scenes if errors.usable(measure, budget, scene, [*candidates, baseline])] for measure in MEASURES}
+        counted = [scene for scene in scenes if errors.usable(budget, scene, [*candidates, baseline])]
+        noisy = not all(errors.clean(budget, scene) for scene in counted)
         for candidate in candidates:
-            cells, better = [], []
+            cells, better = [], 0
             for measure in MEASURES:
-                of = [errors.of[budget, scene, candidate][measure] / errors.of[budget, scene, baseline][measure] for scene in counted[measure]]
-                cells += ["%.2f" % geometric(of), "%.2f" % max(of)] if of else ["-", "-"]
-                better += [geometric(of) < 1] if of else []
+                of = [errors.of[budget, scene, candidate][measure] / errors.of[budget, scene, baseline][measure] for scene in counted]
+                shown = "(%.2f)" if noisy and measure != "relmse" else "%.2f"
+                cells += [shown % geometric(of), shown % max(of)] if of else ["-", "-"]
+                better += bool(of) and geometric(of) < 1
             spp = "%.0f" % geometric(errors.of[budget, scene, candidate]["spp"] for scene in scenes) if scenes else "-"
-            rows.append([budget, "`%s`" % candidate, *cells, "-" if candidate == baseline else "%d of %d" % (sum(better), len(better)), spp])
-        rows[-len(candidates)][0] += " (%d scenes, %d)" % (len(counted["relmse"]), len(counted["smape"]))
+            rows.append([budget, "`%s`" % candidate, *cells, "-" if candidate == baseline or not counted else "%d of 4" % better, spp])
+        rows[-len(candidates)][0] += " (%d scenes)" % len(counted)
         for row in rows[1 - len(candidates):] if len(candidates) > 1 else []:
             row[0] = ""
     return markdown(header, rows)

@@ -24,7 +24,7 @@ class Ratios(unittest.TestCase):
 
     def test_are_geometric_means_over_scenes_with_the_worst_beside(self):
         runs = [run("room", "plain", 1.0), run("room", "good", 0.1), run("hall", "plain", 1.0), run("hall", "good", 0.4)]
-        self.assertEqual(cells(self.of(runs), 0)[:5], ["4spp (2 scenes, 2)", "`good`", "0.20", "0.40", "1.00"])
+        self.assertEqual(cells(self.of(runs), 0)[:5], ["4spp (2 scenes)", "`good`", "0.20", "0.40", "1.00"])
 
     def test_take_the_references_noise_off_the_mean_of_the_seeds(self):
         # Each seed by itself would be cut off at a share of the floor.
@@ -33,7 +33,11 @@ class Ratios(unittest.TestCase):
 
     def test_leave_out_what_a_reference_cannot_tell(self):
         noisy = [run("room", "plain", 0.3, floor=0.2), run("room", "good", 0.21, floor=0.2)]
-        self.assertEqual(cells(self.of(noisy), 0), ["4spp (0 scenes, 0)", "`good`", *["-"] * 8, "0 of 0", "4"])
+        self.assertEqual(cells(self.of(noisy), 0), ["4spp (0 scenes)", "`good`", *["-"] * 9, "4"])
+
+    def test_are_in_parentheses_where_a_references_noise_is_a_part_of_them(self):
+        noisy = [run("room", "plain", 0.6, floor=0.2), run("room", "good", 0.4, floor=0.2)]
+        self.assertEqual(cells(self.of(noisy), 0)[2:5], ["0.50", "0.50", "(1.00)"])
 
     def test_count_the_measures_that_are_better(self):
         runs = [run("room", "plain", 1.0, other=0.1), run("room", "good", 0.1, other=0.2)]

@@ -28,7 +28,8 @@ def failures(errors):
     for budget, scene, method in errors.of:
         for measure in tables.MEASURES:
             rivals = LEARNED.get(method)
-            if not rivals or not errors.usable(measure, budget, scene, [method, *rivals]):
+            noisy = measure != "relmse" and not errors.clean(budget, scene)
+            if not rivals or noisy or not errors.usable(budget, scene, [method, *rivals]):
                 continue
             best = min(errors.of[budget, scene, rival][measure] for rival in rivals)
             ratio = errors.of[budget, scene, method][measure] / best

@@ -20,7 +20,7 @@ def measure(cell, run, where, folder):
     files = [bench.image(folder, run["scene"], method, run["times"][0]) for method in run["methods"]]
     panels = [exr.rgb(file) for file in (*files, where.reference(run["scene"])[0])]
     exr.write(os.path.join(figure.RESULTS, run["file"]), joined([shown(crop(image, run["crop"])) for image in panels]), exr.EIGHT_BIT)
-    return runs
+    return sorted(runs, key=lambda one: run["methods"].index(one["method"]))
 
 
 def crop(image, window):
