@@ -108,11 +108,12 @@ class Half:
         self.variance = rgb("variance.") + rgb("direct_variance.")
 
     def solution_share(self):
-        """Where the solution is good: by the variance of the sampled colours over its squared distance from them, in 3x3 pixels.
-        Both are unbiased, so what the distance has beyond that variance is the solution's own."""
+        """Weights by the variance of the sampled colours and the solution's squared distance from them, in 3x3 pixels. Both are
+        unbiased, so what the distance has beyond that variance is the solution's own; below twice of it nothing is known."""
         relative = lambda values: around((values / (self.image ** 2 + 0.01)).mean(-1))
-        own = relative(self.variance)
-        return (own / np.maximum(relative((self.image - self.sampled) ** 2), own + 1e-20))[..., None]
+        variance = relative(self.variance)
+        own = relative((self.image - self.sampled) ** 2) - variance
+        return np.minimum(1, variance / np.maximum(own, 1e-20))[..., None]
 
     def mixed_by(self, other):
         """Solution and sampled colours, by shares that are independent of both."""
