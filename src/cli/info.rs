@@ -69,19 +69,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         KERNELS.iter().try_for_each(|kernel| out!("{:>10}  {}; {}", kernel.id, kernel.summary, kernel.takes()))?;
     }
     match &args.scene {
-        Some(path) if super::stored::describe(path)? => {
-            if args.report {
-                bail!(Error::Usage("--report is about scenes: give the scene's file".into()));
-            }
-        }
-        Some(path) => {
-            let options = mitsuba::Options { sensor_optional: true, ..args.options.options() };
-            let scene = if args.report { mitsuba::load(path, &options)? } else { super::scene::load(path, &options)? };
-            if args.report {
-                report(&scene, path)?;
-            }
-            describe(&scene, &args.method)?;
-        }
+        Some(path) => file(path, args)?,
         None if !(args.methods || args.kernels || args.layers || args.plugins || args.metrics) => {
             bail!(Error::Usage(
                 "give a scene file, or one of --methods, --kernels, --layers, --plugins, --metrics".into()
@@ -90,6 +78,23 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         None => {}
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Describes a scene, a checkpoint or a file of layers.
+fn file(path: &Path, args: &Args) -> Result<()> {
+    if super::stored::describe(path)? {
+        if args.report {
+            bail!(Error::Usage("--report is about scenes: give the scene's file".into()));
+        }
+        return Ok(());
+    }
+    let options = mitsuba::Options { sensor_optional: true, ..args.options.options() };
+    // Elsewhere warnings are shown as they are found, with their paths.
+    let scene = if args.report { mitsuba::load(path, &options)? } else { super::scene::load(path, &options)? };
+    if args.report {
+        report(&scene, path)?;
+    }
+    describe(&scene, &args.method)
 }
 
 fn methods() -> Result<()> {
