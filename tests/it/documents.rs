@@ -20,10 +20,11 @@ fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// README, CONTRIBUTING, CHANGELOG, and everything below docs and python.
+/// Pages at the top and in folders of their own, and everything below docs.
 fn documents() -> Vec<(PathBuf, String)> {
-    let tops = ["README.md", "CONTRIBUTING.md", "CHANGELOG.md", "python/README.md", "scenes/README.md"];
-    let paths = tops.map(|name| root().join(name)).into_iter().chain(files_below(&root().join("docs"), "md"));
+    let tops = ["README.md", "CONTRIBUTING.md", "CHANGELOG.md"];
+    let tops = tops.into_iter().chain(["figures/README.md", "python/README.md", "scenes/README.md", "tools/README.md"]);
+    let paths = tops.map(|name| root().join(name)).chain(files_below(&root().join("docs"), "md"));
     paths.map(|path| (path.clone(), std::fs::read_to_string(path).unwrap())).collect()
 }
 
