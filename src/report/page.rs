@@ -7,6 +7,7 @@ use serde_json::json;
 
 use super::changes::Change;
 use super::picture::{data_url, heat, tone_mapped, worst};
+use super::summary::each_once;
 use super::tables::{SceneErrors, scene_errors, summaries};
 use crate::bench::{MEASURES, Results};
 use crate::error::{Error, Result};
@@ -64,12 +65,7 @@ impl Page<'_> {
         let views = self.views.iter().map(view).collect::<Result<Vec<_>>>()?;
         let summaries = self.results.map(summaries);
         let errors: Option<Vec<SceneErrors>> = self.results.zip(summaries.as_ref()).map(|(results, summaries)| {
-            let mut budgets: Vec<&str> = Vec::new();
-            for record in &results.records {
-                if !budgets.contains(&record.budget.as_str()) {
-                    budgets.push(&record.budget);
-                }
-            }
+            let budgets = each_once(results.records.iter().map(|record| record.budget.as_str()));
             budgets.into_iter().flat_map(|budget| scene_errors(results, summaries, budget)).collect()
         });
         let floors: BTreeMap<&str, f64> = self.results.map_or_else(BTreeMap::new, |results| {

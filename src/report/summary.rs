@@ -84,12 +84,7 @@ impl Summary {
     /// Summarises a metric of the results.
     pub fn new(results: &Results, metric: &str) -> Self {
         let points = points(results, metric);
-        let mut methods: Vec<&str> = Vec::new();
-        for point in &points {
-            if !methods.contains(&point.method.as_str()) {
-                methods.push(&point.method);
-            }
-        }
+        let methods = each_once(points.iter().map(|point| point.method.as_str()));
         let everywhere = |point: &&Point| {
             let has = |method: &&str| points.iter().any(|other| other.method == **method && other.beside(point));
             methods.iter().all(has)
@@ -100,6 +95,17 @@ impl Summary {
         rows.sort_by(|a, b| rank(a).total_cmp(&rank(b)));
         Self { rows, points }
     }
+}
+
+/// Names in the order that they first come in.
+pub(super) fn each_once<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
+    let mut found = Vec::new();
+    for name in names {
+        if !found.contains(&name) {
+            found.push(name);
+        }
+    }
+    found
 }
 
 fn points(results: &Results, metric: &str) -> Vec<Point> {

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::summary::{Point, Row, Summary};
+use super::summary::{Point, Row, Summary, each_once};
 use crate::bench::{MEASURES, Results};
 
 /// Noise of a reference above this share of a scene's smallest relMSE shows in the other measures, from which it cannot be taken off.
@@ -50,12 +50,8 @@ pub fn summaries(results: &Results) -> [Summary; 4] {
 
 /// The errors of all scenes within a budget.
 pub fn scene_errors(results: &Results, summaries: &[Summary; 4], budget: &str) -> Vec<SceneErrors> {
-    let mut scenes: Vec<&str> = Vec::new();
-    for point in summaries[0].points.iter().filter(|point| point.budget == budget) {
-        if !scenes.contains(&point.scene.as_str()) {
-            scenes.push(&point.scene);
-        }
-    }
+    let points = summaries[0].points.iter().filter(|point| point.budget == budget);
+    let scenes = each_once(points.map(|point| point.scene.as_str()));
     scenes.into_iter().map(|scene| of_scene(results, summaries, scene, budget)).collect()
 }
 

@@ -6,6 +6,7 @@ mod status;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::str::FromStr;
 
 use anyhow::Result;
 use clap::Subcommand;
@@ -15,9 +16,6 @@ use fluxion::job::{ChunkEnd, Job};
 use super::host::{hosted, watched};
 use super::terminal::{note, out};
 use super::{interrupt, progress};
-
-/// End of a chunk that a signal has reached.
-const STOPPED: &str = "was stopped, and is saved";
 
 /// Options of `job`.
 #[derive(clap::Args)]
@@ -74,19 +72,23 @@ pub fn run(args: &Args) -> Result<ExitCode> {
 struct Chunks(Vec<RangeInclusive<usize>>);
 
 fn parse_chunks(text: &str) -> Result<Chunks, String> {
-    let number = |text: &str| text.trim().parse().map_err(|_| "chunks are written as in 7 or 3,17,200-203".to_owned());
-    let range = |part: &str| match part.split_once('-') {
-        Some((first, last)) => Ok(number(first)?..=number(last)?),
-        None => number(part).map(|only| only..=only),
-    };
-    text.split(',').map(range).collect::<Result<_, String>>().map(Chunks)
+    let range = |part: &str| parse_range(part.trim()).map(|(first, last)| first..=last);
+    let ranges = text.split(',').map(range).collect::<Option<_>>();
+    ranges.map(Chunks).ok_or_else(|| "chunks are written as in 7 or 3,17,200-203".to_owned())
+}
+
+/// First and last number of a range such as 1-250, or a number twice.
+fn parse_range<T: FromStr + PartialOrd>(text: &str) -> Option<(T, T)> {
+    let (first, last) = text.split_once('-').unwrap_or((text, text));
+    let (first, last) = (first.parse().ok()?, last.parse().ok()?);
+    (first <= last).then_some((first, last))
 }
 
 /// Renders chunks one after the other, until one is stopped.
 fn render(folder: &Path, chunks: &Chunks) -> Result<ExitCode> {
     let job = Job::load(folder)?;
     for number in chunks.0.iter().flat_map(Clone::clone) {
-        if !is_rendered(&job, number)? {
+        if !render_chunk(&job, number)? {
             break;
         }
     }
@@ -94,22 +96,23 @@ fn render(folder: &Path, chunks: &Chunks) -> Result<ExitCode> {
 }
 
 /// Renders a chunk; false if that was stopped.
-fn is_rendered(job: &Job, number: usize) -> Result<bool> {
+fn render_chunk(job: &Job, number: usize) -> Result<bool> {
     let part = job.unfinished(number);
     say_what_is_kept(format!("; the last checkpoint, if there was time for one, is kept in {}", part.display()));
-    let (chunk, stats, what) = match hosted(&[], |_| true, |host| job.run(number, host))?? {
+    let (chunk, stats, is_complete) = match hosted(&[], |_| true, |host| job.run(number, host))?? {
         ChunkEnd::Complete => {
             note!("chunk {number} is complete");
             return Ok(true);
         }
-        ChunkEnd::Rendered(chunk, stats) => (chunk, stats, "is complete"),
-        ChunkEnd::Stopped(chunk, stats) => (chunk, stats, STOPPED),
+        ChunkEnd::Rendered(chunk, stats) => (chunk, stats, true),
+        ChunkEnd::Stopped(chunk, stats) => (chunk, stats, false),
     };
     interrupt::saved();
     let seconds = progress::seconds(std::time::Duration::from_secs_f64(stats.seconds.render));
     let (name, first) = (job.name(chunk.image), chunk.first);
+    let what = if is_complete { "is complete" } else { "was stopped, and is saved" };
     out!("chunk {number} {what}: {} samples per pixel of {name} from number {first} on, in {seconds}", stats.spp)?;
-    Ok(what != STOPPED)
+    Ok(is_complete)
 }
 
 fn allocate(folder: &Path) -> Result<ExitCode> {

@@ -46,10 +46,8 @@ pub struct Args {
 
 /// First and last number of a range such as 1-250.
 fn parse_frames(text: &str) -> Result<(u32, u32), String> {
-    let wrong = || format!("`{text}` is not a range such as 1-250");
-    let (first, last) = text.split_once('-').unwrap_or((text, text));
-    let frames = (first.parse().map_err(|_| wrong())?, last.parse().map_err(|_| wrong())?);
-    if frames.0 <= frames.1 && frames.1 < u32::MAX { Ok(frames) } else { Err(wrong()) }
+    let range = super::parse_range(text).filter(|&(_, last)| last < u32::MAX);
+    range.ok_or_else(|| format!("`{text}` is not a range such as 1-250"))
 }
 
 /// The options of `fluxion render` behind the --.
