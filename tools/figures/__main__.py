@@ -28,7 +28,7 @@ def status(_):
 
 
 def check(_):
-    wrong = pages.check()
+    wrong = pages.names(pages.outdated())
     if wrong:
         sys.exit("%s: not what the figures say; `python3 tools/figures print` mends it" % ", ".join(wrong))
     other = [one.name for one in figure.every() if "run" in (one.changed() or [])]

@@ -41,8 +41,9 @@ class Figure:
 
     def inputs(self):
         """Digests of what decides the figure: what is run on which scenes, by which code."""
-        asked = {"run": [self["measure"], self["run"]], **({"sizes": self.sizes()} if self.sizes() else {})}
-        bundled = [os.path.join("scenes", name) for name in self.sizes() if name in scenes.bundled()]
+        sizes, inside = self.sizes(), scenes.bundled()
+        asked = {"run": [self["measure"], self["run"]], **({"sizes": sizes} if sizes else {})}
+        bundled = [os.path.join("scenes", name) for name in sizes if name in inside]
         paths = ["tools/figures/measures/%s.py" % self["measure"], *bundled, *sources.all_below(self["depends"])]
         digests = {key: sources.of_text(json.dumps(value, sort_keys=True)) for key, value in asked.items()}
         return {**digests, **{path: sources.of_path(path) for path in paths}}

@@ -21,8 +21,7 @@ def expected():
     found[os.path.join(figure.RESULTS, "README.md")] = index()
     for path in documents():
         if path not in found:
-            with open(path) as file:
-                text = file.read()
+            text = written(path)
             if len(MARKS.findall(text)) != text.count(BEGIN):
                 raise SyntaxError("%s has a mark of a figure that is not written `%sNAME.TABLE -->`, or has no end" % (path, BEGIN))
             found[path] = MARKS.sub(lambda match: between(*match.groups()), text)
@@ -67,18 +66,27 @@ def index():
     return "\n\n".join(lines) + "\n"
 
 
+def outdated():
+    """Paths of the pages whose text is not that of their figures, with the text that they should have."""
+    return {path: text for path, text in expected().items() if text != written(path)}
+
+
+def written(path):
+    """The text of a page; None if there is none."""
+    if not os.path.exists(path):
+        return None
+    with open(path) as file:
+        return file.read()
+
+
 def print_all():
     """Writes the pages that differ, and returns their names."""
-    changed = []
-    for path, text in expected().items():
-        if not os.path.exists(path) or open(path).read() != text:
-            os.makedirs(os.path.dirname(path), exist_ok=True)
-            with open(path, "w") as file:
-                file.write(text)
-            changed.append(os.path.relpath(path, ROOT))
-    return changed
+    changed = outdated()
+    for path, text in changed.items():
+        with open(path, "w") as file:
+            file.write(text)
+    return names(changed)
 
 
-def check():
-    """Names of the pages whose text is not that of their figures."""
-    return [os.path.relpath(path, ROOT) for path, text in expected().items() if not os.path.exists(path) or open(path).read() != text]
+def names(paths):
+    return [os.path.relpath(path, ROOT) for path in paths]

@@ -68,16 +68,24 @@ class Reference:
 
     def halves(self, method, spp):
         """Both images, and the seconds of all their samples."""
-        rendered = [self.half(method, spp, seed) for seed in SEEDS]
-        first, second = (half for half, _ in rendered)
-        images = [first.image, second.image] if method == "primal" else [first.mixed_by(second), second.mixed_by(first)]
-        return images, sum(seconds for _, seconds in rendered)
+        images, seconds = zip(*(self.half(method, spp, seed) for seed in SEEDS))
+        if method != "primal":
+            first, second = (Half(image, self.layers(method, seed)) for image, seed in zip(images, SEEDS))
+            images = first.mixed_by(second), second.mixed_by(first)
+        return images, sum(seconds)
+
+    def layers(self, method, seed):
+        """What a half has sampled."""
+        with tempfile.TemporaryDirectory() as folder:
+            file = os.path.join(folder, "layers.exr")
+            program.call("merge", self.at(f"-{method}-{seed}.ckpt"), "-o", file, "-q")
+            return exr.everything(file)
 
     def half(self, method, spp, seed):
-        """Continues a half, and reads it; the seconds of its samples."""
+        """Continues a half: its image, and the seconds of its samples."""
         checkpoint = self.at(f"-{method}-{seed}.ckpt")
         with tempfile.TemporaryDirectory() as folder:
-            image, stats, layers = (os.path.join(folder, name) for name in ("image.exr", "stats.json", "layers.exr"))
+            image, stats = (os.path.join(folder, name) for name in ("image.exr", "stats.json"))
             code, _, messages = program.finished(
                 "render", self.scene.path, "-o", image, "--json", stats, "--size", self.scene.size, "--method", method, "--spp", spp,
                 "--seed", seed, "--checkpoint", checkpoint, "--resume", "-q")
@@ -85,9 +93,8 @@ class Reference:
                 raise KeyboardInterrupt
             if code != 0:
                 raise program.Failed(messages)
-            program.call("merge", checkpoint, "-o", layers, "-q")
             with open(stats) as file:
-                return Half(exr.rgb(image), exr.everything(layers)), json.load(file)["seconds"]["render"]
+                return exr.rgb(image), json.load(file)["seconds"]["render"]
 
     def save(self, method, spp, images, seconds):
         first, second = images

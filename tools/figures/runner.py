@@ -46,13 +46,10 @@ def context(public, work):
 def run(one, where):
     """Measures a figure and stores it."""
     measure = importlib.import_module("measures." + one["measure"])
-    head, known = one.head(), {}
     require(one.name, "scene", [name for name in one.sizes() if name not in {scene.name for scene in where.scenes}])
     if measure.REFERENCES:
         require(one.name, "reference", [name for name in one.sizes() if not os.path.exists(os.path.join(where.references, name + ".json"))])
-        known = {name: where.reference(name)[1] for name in one.sizes()}
-    head, runs, seconds = measured(one.name, measure, one["run"], where, {**head, "references": known})
-    del head["references"]
+    head, runs, seconds = measured(one.name, measure, one["run"], where, one.sizes() if measure.REFERENCES else [], one.head())
     one.save(head, runs, seconds)
     forget(one.name, where)
 
@@ -63,11 +60,12 @@ def require(name, what, missing):
                  % (name, what, ", ".join(missing)))
 
 
-def measured(name, measure, run, where, head):
+def measured(name, measure, run, where, judged, head):
     """All runs of a measure, with the head that was written down when they were begun and the seconds that they took. Cells that were
-    measured by the same program on the same machine before an interruption are not measured again."""
-    decides = {key: value for key, value in head.items() if key not in ("commit", "date")}
-    folder = os.path.join(where.work, "%s-%s" % (name, sources.of_text(json.dumps([decides, run, program_digest()], sort_keys=True))))
+    measured before an interruption, by the same program on the same machine and with the same references of the scenes that are `judged`
+    by them, are not measured again."""
+    decides = [head.get("machine"), head.get("inputs"), run, {scene: where.reference(scene)[1] for scene in judged}, program_digest()]
+    folder = os.path.join(where.work, "%s-%s" % (name, sources.of_text(json.dumps(decides, sort_keys=True))))
     os.makedirs(folder, exist_ok=True)
     head = first_head(os.path.join(folder, "head.json"), head)
     path = os.path.join(folder, "cells.jsonl")

@@ -1,4 +1,5 @@
 """Digests of what figures depend on, by the table of modules in docs/design/architecture.md."""
+import functools
 import hashlib
 import os
 import re
@@ -34,6 +35,7 @@ def of_text(text):
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
+@functools.cache
 def of_path(path):
     """Of a file or folder of the repository. Comments and empty lines of code do not count, nor do documents."""
     whole = hashlib.sha256()

@@ -34,8 +34,7 @@ class Errors:
     """Means over seeds by budget, scene and candidate; relMSE with the reference's own noise taken off."""
 
     def __init__(self, runs, candidate):
-        self.runs, self.of = runs, {}
-        collected = {}
+        self.of, collected = {}, {}
         for run in runs:
             key = run["budget"], run["scene"], candidate(run)
             collected.setdefault(key, []).append(run)
@@ -75,7 +74,7 @@ def ratios(specification, runs):
         scenes = [scene for scene in errors.scenes if errors.has(budget, scene, baseline, *candidates)]
         counted = [scene for scene in scenes if errors.usable(budget, scene, [*candidates, baseline])]
         noisy = not all(errors.clean(budget, scene) for scene in counted)
-        for candidate in candidates:
+        for number, candidate in enumerate(candidates):
             cells, better = [], 0
             for measure in MEASURES:
                 of = [errors.of[budget, scene, candidate][measure] / errors.of[budget, scene, baseline][measure] for scene in counted]
@@ -83,10 +82,8 @@ def ratios(specification, runs):
                 cells += [shown % geometric(of), shown % max(of)] if of else ["-", "-"]
                 better += bool(of) and geometric(of) < 1
             spp = "%.0f" % geometric(errors.of[budget, scene, candidate]["spp"] for scene in scenes) if scenes else "-"
-            rows.append([budget, "`%s`" % candidate, *cells, "-" if candidate == baseline or not counted else "%d of 4" % better, spp])
-        rows[-len(candidates)][0] += " (%d scenes)" % len(counted)
-        for row in rows[1 - len(candidates):] if len(candidates) > 1 else []:
-            row[0] = ""
+            label = "%s (%d scenes)" % (budget, len(counted)) if number == 0 else ""
+            rows.append([label, "`%s`" % candidate, *cells, "-" if candidate == baseline or not counted else "%d of 4" % better, spp])
     return markdown(header, rows)
 
 
@@ -115,16 +112,11 @@ def rows(specification, runs):
     """A row for each value of a key, a column for each other key or quotient of two; medians or means of all its runs."""
     key, columns = specification["key"], specification["columns"]
     combine = {"median": statistics.median, "mean": statistics.fmean, "first": lambda values: values[0]}[specification.get("combine", "median")]
-    lines, last = [], []
-    for name in unique(run[key] for run in runs):
-        same = [run for run in runs if run[key] == name]
-        lines.append([str(name)] + [show(column, same, combine) for column in columns])
+    groups = {name: [run for run in runs if run[key] == name] for name in unique(run[key] for run in runs)}
+    lines = [[str(name)] + [show(column, same, combine) for column in columns] for name, same in groups.items()]
     if "mean_of" in specification:
-        for column in columns:
-            keep = column["name"] in specification["mean_of"]
-            values = [amount(column["value"], [run for run in runs if run[key] == name], combine) for name in unique(run[key] for run in runs)]
-            last.append(column["format"] % geometric(values) if keep else "")
-        lines.append(["geometric mean", *last])
+        mean = lambda column: column["format"] % geometric(amount(column["value"], same, combine) for same in groups.values())
+        lines.append(["geometric mean", *(mean(column) if column["name"] in specification["mean_of"] else "" for column in columns)])
     return markdown([key, *(column["name"] for column in columns)], lines)
 
 
