@@ -68,10 +68,12 @@ impl HalfEdges {
 
     /// Adds to the differences across half-edge number `slot` of a path.
     #[inline(always)]
-    pub fn add(&mut self, path: usize, slot: usize, (color, ambient): (Rgb, Rgb)) {
+    pub fn add(&mut self, path: usize, slot: usize, (color, ambient): (Rgb, Option<Rgb>)) {
         let at = self.starts[path] as usize + slot;
         self.color[at] += color;
-        self.ambient[at] += ambient;
+        if let Some(ambient) = ambient {
+            self.ambient[at] += ambient;
+        }
     }
 
     /// The differences of a path.

@@ -23,8 +23,6 @@ pub struct PathRecord {
     pub samples: Vec<Sample>,
     /// The contributions of groups of emitters, if they are asked for.
     pub lights: GroupLights,
-    /// Number of leading vertices of every path up to the last one that receives light.
-    pub lit_length: Vec<u32>,
     /// Work of the latest wave.
     pub work: Work,
     walks: Vec<FeatureWalk>,
@@ -38,7 +36,6 @@ impl PathRecord {
             list.resize(count, T::default());
         }
         reset(&mut self.samples, count);
-        reset(&mut self.lit_length, count);
         reset(&mut self.walks, count);
         self.lights.start(count, groups);
         self.packets.clear();
@@ -79,7 +76,6 @@ impl PathRecord {
             }
             self.samples[id].color += found.color;
             self.lights.add(scene, id, (found.point.emitter, found.color));
-            self.lit_length[id] = depth;
             if let Some(level) = recorded {
                 let parent = packet.parent.0[lane] as usize;
                 let vertices = &mut self.levels[level - 1][parent / LANES];
@@ -123,12 +119,11 @@ impl PathRecord {
     }
 
     /// Adds the direct light of some vertices, from next-event estimation, to the colour.
-    pub fn add_direct(&mut self, scene: &Scene, depth: u32, vertices: &Vertices, shaded: &Shaded) {
+    pub fn add_direct(&mut self, scene: &Scene, vertices: &Vertices, shaded: &Shaded) {
         for lane in vertices.lit.lanes() {
             let (id, color) = (vertices.id.0[lane] as usize, shaded.color.get(lane));
             self.samples[id].color += color;
             self.lights.add(scene, id, (vertices.light.points.emitter(lane), color));
-            self.lit_length[id] = depth + 1;
         }
         for lane in shaded.non_finite.lanes() {
             self.samples[vertices.id.0[lane] as usize].color = Rgb::NAN;

@@ -104,7 +104,7 @@ impl<'a> PathTracer<'a> {
                 continue;
             }
             let shaded = shade((scene, &sampler), depth, packet, vertices, (k * LANES) as u32, next);
-            record.add_direct(scene, depth, vertices, &shaded);
+            record.add_direct(scene, vertices, &shaded);
             if needs.has(Recorded::Alpha) || scene.integrator().hide_emitters {
                 record.cover(packet, vertices.hit & !vertices.passed);
             }

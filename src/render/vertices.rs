@@ -1,6 +1,6 @@
 //! Vertices of sixteen paths: surface, next-event sample and scattered direction.
 
-use crate::math::lanes::{Bits, Lanes, Lanes3, Mask};
+use crate::math::lanes::{Bits, LANES, Lanes, Lanes3, Mask};
 use crate::scene::closure::{Evals, Scatters};
 use crate::scene::packet::{Lights, Materials, Surfaces};
 
@@ -64,6 +64,17 @@ pub struct Emission {
     pub radiance: Lanes3,
     /// Densities with which next-event estimation would have sampled the points; 0 after a delta lobe.
     pub light_pdf: Lanes,
+}
+
+impl Vertices {
+    /// Lanes whose path goes on to one of the vertices of the next depth, with packet and lane there.
+    #[inline(always)]
+    pub fn followed_by(&self, below: &[Self]) -> impl Iterator<Item = (usize, usize, usize)> {
+        (self.hit & self.scattered).lanes().filter_map(|lane| {
+            let (packet, at) = (self.next.0[lane] as usize / LANES, self.next.0[lane] as usize % LANES);
+            below.get(packet).filter(|there| there.hit.get(at)).map(|_| (lane, packet, at))
+        })
+    }
 }
 
 impl Default for Vertices {

@@ -1,6 +1,6 @@
 //! Unsigned integers as a vector.
 
-use super::{LANES, Lanes, Mask};
+use super::{LANES, Lanes, Mask, copy_beside};
 
 /// The integers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -14,6 +14,12 @@ impl<const N: usize> Bits<N> {
     #[inline(always)]
     pub fn splat(value: u32) -> Self {
         Self([value; N])
+    }
+
+    /// [`Lanes::copy_beside`].
+    #[inline(always)]
+    pub fn copy_beside<const STEP: i32>(&mut self, from: &Self) {
+        copy_beside::<STEP, _, N>(&mut self.0, &from.0);
     }
 
     /// A function of every one.

@@ -2,7 +2,7 @@
 
 use std::ops::{BitAnd, BitOr, Not};
 
-use super::{Bits, LANES, Lanes, Lanes3};
+use super::{Bits, LANES, Lanes, Lanes3, copy_beside};
 
 /// A set of lanes: all bits of a lane are set or none.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,6 +27,12 @@ impl<const N: usize> Mask<N> {
     #[inline(always)]
     pub fn set(&mut self, lane: usize, holds: bool) {
         self.0[lane] = if holds { !0 } else { 0 };
+    }
+
+    /// [`Lanes::copy_beside`].
+    #[inline(always)]
+    pub fn copy_beside<const STEP: i32>(&mut self, from: &Self) {
+        copy_beside::<STEP, _, N>(&mut self.0, &from.0);
     }
 
     /// Whether it holds for any lane.

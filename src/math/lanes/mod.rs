@@ -16,6 +16,18 @@ pub use self::vector::Lanes3;
 /// Number of floats in a packet.
 pub const LANES: usize = 16;
 
+/// Copies to every lane the one that is `STEP` lanes behind it, or before it if that is negative; lanes that have none stay as they
+/// are.
+#[inline(always)]
+fn copy_beside<const STEP: i32, T: Copy, const N: usize>(to: &mut [T; N], from: &[T; N]) {
+    let step = STEP.unsigned_abs() as usize;
+    if STEP >= 0 {
+        to[..N - step].copy_from_slice(&from[step..]);
+    } else {
+        to[step..].copy_from_slice(&from[..N - step]);
+    }
+}
+
 /// The floats.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lanes<const N: usize = LANES>(pub [f32; N]);
@@ -45,6 +57,13 @@ impl<const N: usize> Lanes<N> {
     #[inline(always)]
     pub fn store(self, to: &mut [f32]) {
         to[..N].copy_from_slice(&self.0);
+    }
+
+    /// Copies to every lane the one that is `STEP` lanes behind it, or before it if that is negative; lanes that have none stay
+    /// as they are.
+    #[inline(always)]
+    pub fn copy_beside<const STEP: i32>(&mut self, from: &Self) {
+        copy_beside::<STEP, _, N>(&mut self.0, &from.0);
     }
 
     #[inline(always)]

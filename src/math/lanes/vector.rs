@@ -38,6 +38,14 @@ impl<const N: usize> Lanes3<N> {
         (self.x.0[lane], self.y.0[lane], self.z.0[lane]) = value.into();
     }
 
+    /// [`Lanes::copy_beside`].
+    #[inline(always)]
+    pub fn copy_beside<const STEP: i32>(&mut self, from: &Self) {
+        self.x.copy_beside::<STEP>(&from.x);
+        self.y.copy_beside::<STEP>(&from.y);
+        self.z.copy_beside::<STEP>(&from.z);
+    }
+
     /// All one.
     pub const ONE: Self = Self { x: Lanes::ONE, y: Lanes::ONE, z: Lanes::ONE };
 
@@ -108,6 +116,16 @@ impl<const N: usize> Lanes3<N> {
     #[inline(always)]
     pub fn abs(self) -> Self {
         Self { x: self.x.abs(), y: self.y.abs(), z: self.z.abs() }
+    }
+
+    /// Mask of the lanes in which the same coordinates are zero as in others.
+    #[inline(always)]
+    pub fn same_zeros(self, other: Self) -> Mask<N> {
+        let alike = |a: Lanes<N>, b: Lanes<N>| {
+            let (a, b) = (a.abs().greater(Lanes::ZERO), b.abs().greater(Lanes::ZERO));
+            (a & b) | !(a | b)
+        };
+        alike(self.x, other.x) & alike(self.y, other.y) & alike(self.z, other.z)
     }
 
     /// Mask of the lanes with a coordinate other than zero.

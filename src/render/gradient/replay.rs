@@ -45,7 +45,7 @@ impl ShiftMapping for Replay {
                 if camera.neighbour(camera.pixels[path], step).is_some() {
                     let sample = &record.samples[path];
                     let color = 0.5 * (neighbour.color - sample.color);
-                    edges.add(path, slot, (color, 0.5 * (neighbour.ambient - sample.ambient)));
+                    edges.add(path, slot, (color, Some(0.5 * (neighbour.ambient - sample.ambient))));
                 }
             }
         }

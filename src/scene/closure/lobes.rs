@@ -52,6 +52,9 @@ pub trait OfPackets {
 
     /// [`Lobes::propose`].
     fn propose_packet(closures: &Closures, wi: Lanes3, numbers: &Numbers) -> Proposals;
+
+    /// [`Lobes::delta`].
+    fn delta_packet(closures: &Closures, wi: Lanes3, lobe: Lobe) -> Deltas;
 }
 
 /// The lobes of closures of all kinds, neither perturbed nor with holes, from the front.
@@ -61,6 +64,9 @@ pub trait AllLobes<const N: usize> {
 
     /// [`Lobes::propose`].
     fn propose_lobes(&self, wi: Lanes3<N>, numbers: &Numbers<N>, active: Mask<N>) -> Proposals<N>;
+
+    /// [`Lobes::delta`].
+    fn delta_lobes(&self, wi: Lanes3<N>, lobe: Lobe, active: Mask<N>) -> Deltas<N>;
 
     /// Normals of visible facets.
     fn visible_facets(facets: &Facets<N>, wi: Lanes3<N>, u: [Lanes<N>; 2]) -> Lanes3<N>;
@@ -108,7 +114,7 @@ fn propose<L: Lobes<1>>(lobes: &L, wi: Lanes3<1>, numbers: &Numbers<1>) -> Propo
 }
 
 #[inline(never)]
-fn delta_of<L: Lobes<1>>(lobes: &L, wi: Lanes3<1>, lobe: Lobe) -> Deltas<1> {
+fn delta<L: Lobes<1>>(lobes: &L, wi: Lanes3<1>, lobe: Lobe) -> Deltas<1> {
     lobes.delta(wi, lobe)
 }
 
@@ -121,6 +127,11 @@ impl AllLobes<1> for Closure {
     fn propose_lobes(&self, wi: Lanes3<1>, numbers: &Numbers<1>, active: Mask<1>) -> Proposals<1> {
         each_kind!(self, active, |Each, _lanes| return propose(&Each::load(self), wi, numbers));
         (Scatters::default(), Mask::NONE)
+    }
+
+    fn delta_lobes(&self, wi: Lanes3<1>, lobe: Lobe, active: Mask<1>) -> Deltas<1> {
+        each_kind!(self, active, |Each, _lanes| return delta(&Each::load(self), wi, lobe));
+        Deltas::NONE
     }
 
     fn visible_facets(facets: &Facets<1>, wi: Lanes3<1>, u: [Lanes<1>; 2]) -> Lanes3<1> {
@@ -145,6 +156,12 @@ impl AllLobes<LANES> for Closures {
         (scatters, found)
     }
 
+    fn delta_lobes(&self, wi: Lanes3, lobe: Lobe, active: Mask) -> Deltas {
+        let mut deltas = Deltas::NONE;
+        each_kind!(self, active, |Each, lanes| deltas = deltas.replaced(&Each::delta_packet(self, wi, lobe), lanes));
+        deltas
+    }
+
     fn visible_facets(facets: &Facets, wi: Lanes3, u: [Lanes; 2]) -> Lanes3 {
         visible_facets(facets, wi, u)
     }
@@ -155,10 +172,4 @@ vectorized! {
     pub fn visible_facets(facets: &Facets, wi: Lanes3, u: [Lanes; 2]) -> Lanes3 {
         facets.sample_visible(wi, u)
     }
-}
-
-/// [`Lobes::delta`] of a single closure.
-pub fn delta(closure: &Closure, wi: Lanes3<1>, lobe: Lobe) -> Deltas<1> {
-    each_kind!(closure, Mask([!0]), |Each, _lanes| return delta_of(&Each::load(closure), wi, lobe));
-    Deltas::NONE
 }

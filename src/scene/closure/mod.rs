@@ -123,29 +123,9 @@ impl Closure {
         self.eval(Lanes3::splat(wi), Lanes3::splat(wo), Mask([!0])).get(0)
     }
 
-    /// Scattering by a delta lobe.
-    pub fn delta(&self, from: Vec3, lobe: Lobe) -> Option<Delta> {
-        if lobe == Lobe::Null {
-            let hole = Deltas { wo: Lanes3::splat(-from), value: Lanes3::ONE, probability: Lanes::ONE };
-            return hole.scaled(Lanes::ONE - self.opacity).get(0);
-        }
-        let from = Lanes3::splat(from);
-        let behind = self.behind(from);
-        let mut wi = from.mirror(behind);
-        let perturbed = self.perturbation.lanes.any();
-        let frame = self.perturbation.frame(wi);
-        if perturbed {
-            wi = frame.to_local(wi);
-        }
-        let mut deltas = lobes::delta(self, wi, lobe).scaled(self.opacity);
-        if perturbed {
-            let wo = frame.to_world(deltas.wo);
-            if !(wo.z * deltas.wo.z).greater(Lanes::ZERO).any() {
-                return None;
-            }
-            (deltas.wo, deltas.value) = (wo, deltas.value * self.perturbation.unshadowed(wo));
-        }
-        Deltas { wo: deltas.wo.mirror(behind), ..deltas }.get(0)
+    /// [`Closures::deltas`] of a single closure.
+    pub fn delta(&self, wi: Vec3, lobe: Lobe) -> Option<Delta> {
+        self.deltas(Lanes3::splat(wi), lobe, Mask([!0])).get(0)
     }
 
     /// Number of the [`Kind`] of its lobes.
@@ -189,6 +169,21 @@ impl<const N: usize> Closures<N> {
         let count = from.count.0[lane] as usize;
         for (to_lanes, from_lanes) in self.parameters.iter_mut().zip(&from.parameters).take(count) {
             to_lanes.0[to] = from_lanes.0[lane];
+        }
+    }
+
+    /// [`Lanes::copy_beside`].
+    #[inline(always)]
+    pub fn copy_beside<const STEP: i32>(&mut self, from: &Self) {
+        self.kind.copy_beside::<STEP>(&from.kind);
+        self.count.copy_beside::<STEP>(&from.count);
+        self.roughness.copy_beside::<STEP>(&from.roughness);
+        self.two_sided.copy_beside::<STEP>(&from.two_sided);
+        self.opacity.copy_beside::<STEP>(&from.opacity);
+        self.perturbation.copy_beside::<STEP>(&from.perturbation);
+        let most = from.count.0.iter().fold(0, |most, &count| most.max(count)) as usize;
+        for (to, from) in self.parameters.iter_mut().zip(&from.parameters).take(most) {
+            to.copy_beside::<STEP>(from);
         }
     }
 
@@ -295,5 +290,29 @@ where
             scatters = scatters.or_straight_on(from, Lanes::ONE - self.opacity, hole);
         }
         (scatters, found | hole)
+    }
+    /// Scattering by a delta lobe in the active lanes; of others anything.
+    #[inline(always)]
+    pub fn deltas(&self, from: Lanes3<N>, lobe: Lobe, active: Mask<N>) -> Deltas<N> {
+        if lobe == Lobe::Null {
+            let hole = Deltas { wo: -from, value: Lanes3::ONE, probability: Lanes::ONE };
+            return hole.scaled(Lanes::ONE - self.opacity);
+        }
+        let behind = self.behind(from);
+        let mut wi = from.mirror(behind);
+        let perturbed = active & self.perturbation.lanes;
+        let frame = self.perturbation.frame(wi);
+        if perturbed.any() {
+            wi = perturbed.select3(frame.to_local(wi), wi);
+        }
+        let mut deltas = self.delta_lobes(wi, lobe, active).scaled(self.opacity);
+        if perturbed.any() {
+            let wo = frame.to_world(deltas.wo);
+            let other_side = perturbed & !(wo.z * deltas.wo.z).greater(Lanes::ZERO);
+            let share = perturbed.select(self.perturbation.unshadowed(wo), Lanes::ONE);
+            deltas.probability = other_side.select(Lanes::ZERO, deltas.probability);
+            (deltas.wo, deltas.value) = (perturbed.select3(wo, deltas.wo), deltas.value * share);
+        }
+        Deltas { wo: deltas.wo.mirror(behind), ..deltas }
     }
 }

@@ -94,7 +94,7 @@ macro_rules! parameters {
             use $crate::math::lanes::{LANES, Lanes, Lanes3};
             use $crate::scene::closure::lobes::{Lobes, OfPackets};
             use $crate::scene::closure::parameter::Parameter;
-            use $crate::scene::closure::{Closure, Closures, Evals, Kind, Numbers, PARAMETERS, Proposals};
+            use $crate::scene::closure::{Closure, Closures, Deltas, Evals, Kind, Lobe, Numbers, PARAMETERS, Proposals};
 
             impl<const N: usize> $kind<N> {
                 /// The parameters of closures, as far as these are of the kind.
@@ -131,6 +131,10 @@ macro_rules! parameters {
                 fn propose_packet(closures: &Closures, wi: Lanes3, numbers: &Numbers) -> Proposals {
                     propose(closures, wi, numbers)
                 }
+
+                fn delta_packet(closures: &Closures, wi: Lanes3, lobe: Lobe) -> Deltas {
+                    delta(closures, wi, lobe)
+                }
             }
 
             vectorized! {
@@ -142,6 +146,12 @@ macro_rules! parameters {
             vectorized! {
                 fn propose(closures: &Closures, wi: Lanes3, numbers: &Numbers) -> Proposals {
                     $kind::load(closures).propose(wi, numbers)
+                }
+            }
+
+            vectorized! {
+                fn delta(closures: &Closures, wi: Lanes3, lobe: Lobe) -> Deltas {
+                    $kind::load(closures).delta(wi, lobe)
                 }
             }
         };

@@ -30,6 +30,17 @@ impl<const N: usize> Perturbation<N> {
         }
     }
 
+    /// [`Lanes::copy_beside`].
+    #[inline(always)]
+    pub fn copy_beside<const STEP: i32>(&mut self, from: &Self) {
+        self.lanes.copy_beside::<STEP>(&from.lanes);
+        if from.lanes.any() {
+            self.flips.copy_beside::<STEP>(&from.flips);
+            self.shadows.copy_beside::<STEP>(&from.shadows);
+            self.normal.copy_beside::<STEP>(&from.normal);
+        }
+    }
+
     /// The perturbed frames.
     #[inline(always)]
     pub fn frame(&self, wi: Lanes3<N>) -> Frames<N> {

@@ -150,9 +150,15 @@ impl<const N: usize> Scatters<N> {
             wo: self.wo.get(lane),
             weight: self.weight.get(lane),
             pdf: self.pdf.0[lane],
-            lobe: LOBES[self.lobe.0[lane] as usize],
+            lobe: self.lobe(lane),
             eta: self.eta.0[lane],
         }
+    }
+
+    /// The lobe of one lane.
+    #[inline(always)]
+    pub fn lobe(&self, lane: usize) -> Lobe {
+        LOBES[self.lobe.0[lane] as usize]
     }
 
     /// Lanes whose direction is one of a lobe.
@@ -170,6 +176,26 @@ impl<const N: usize> Deltas<N> {
     #[inline(always)]
     pub fn scaled(self, share: Lanes<N>) -> Self {
         Self { value: self.value * share, probability: self.probability * share, ..self }
+    }
+
+    /// Others in some lanes.
+    #[inline(always)]
+    pub fn replaced(self, others: &Self, lanes: Mask<N>) -> Self {
+        Self {
+            wo: lanes.select3(others.wo, self.wo),
+            value: lanes.select3(others.value, self.value),
+            probability: lanes.select(others.probability, self.probability),
+        }
+    }
+
+    /// Sets one lane.
+    pub fn set(&mut self, lane: usize, delta: Option<Delta>) {
+        self.probability.0[lane] = 0.0;
+        if let Some(Delta { wo, value, probability }) = delta {
+            self.wo.set(lane, wo);
+            self.value.set(lane, value);
+            self.probability.0[lane] = probability;
+        }
     }
 
     /// The samples of a lobe, and the lanes that have it.

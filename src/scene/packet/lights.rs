@@ -77,6 +77,11 @@ impl Lights {
         self.envmap_radiance.set(lane, radiance);
     }
 
+    /// Whether one lane's point is at infinity.
+    pub fn is_far(&self, lane: usize) -> bool {
+        self.far.get(lane)
+    }
+
     /// The emitter of one lane's point.
     pub fn emitter(&self, lane: usize) -> u32 {
         self.emitter.0[lane]

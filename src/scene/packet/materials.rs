@@ -4,7 +4,7 @@ use super::Surfaces;
 use crate::math::lanes::{Lanes, Lanes3, Mask};
 use crate::math::{Rgb, vec2};
 use crate::scene::Scene;
-use crate::scene::closure::{Closures, Draws, Evals, Scatters};
+use crate::scene::closure::{Closures, Deltas, Draws, Evals, Lobe, Scatters};
 
 /// Materials of sixteen surfaces.
 #[derive(Clone, Debug, Default)]
@@ -36,6 +36,12 @@ impl Materials {
     #[inline(always)]
     pub fn copy(&mut self, to: usize, from: &Self, lane: usize) {
         self.closures.copy(to, &from.closures, lane);
+    }
+
+    /// [`Lanes::copy_beside`].
+    #[inline(always)]
+    pub fn copy_beside<const STEP: i32>(&mut self, from: &Self) {
+        self.closures.copy_beside::<STEP>(&from.closures);
     }
 
     /// Smallest roughness of the smooth lobes, infinite for diffuse ones; negative without smooth lobes.
@@ -71,6 +77,26 @@ impl Materials {
             evals.set(lane, scene.bsdf(&surface).eval(&surface, wi.get(lane), wo.get(lane)));
         }
         evals
+    }
+
+    /// Scattering of the active lanes by a delta lobe; none in the others.
+    pub fn deltas(&self, scene: &Scene, surfaces: &Surfaces, (wi, lobe): (Lanes3, Lobe), active: Mask) -> Deltas {
+        let closed = active & self.closures.exist();
+        let mut deltas = Deltas::NONE;
+        if closed.any() {
+            deltas = deltas.replaced(&self.closures.deltas(wi, lobe, closed), closed);
+        }
+        for lane in (active & !self.closures.exist()).lanes() {
+            let surface = surfaces.get(lane);
+            deltas.set(lane, scene.bsdf(&surface).delta(&surface, wi.get(lane), lobe));
+        }
+        deltas
+    }
+
+    /// Lanes whose material is a closure, which has one delta lobe of a kind at most.
+    #[inline(always)]
+    pub fn are_closures(&self) -> Mask {
+        self.closures.exist()
     }
 
     /// Samples directions for the active lanes; returns the lanes that have one.

@@ -185,6 +185,41 @@ impl Surfaces {
         }
     }
 
+    /// Copies what visibility depends on of one lane of other surfaces: place, frame and how rays leave.
+    #[inline(always)]
+    pub fn copy_place(&mut self, to: usize, from: &Self, lane: usize) {
+        self.p.set(to, from.p.get(lane));
+        self.n.set(to, from.n.get(lane));
+        self.frame.s.set(to, from.frame.s.get(lane));
+        self.frame.t.set(to, from.frame.t.get(lane));
+        self.frame.n.set(to, from.frame.n.get(lane));
+        self.epsilon.0[to] = from.epsilon.0[lane];
+        self.curvature.0[to] = from.curvature.0[lane];
+    }
+
+    /// [`Lanes::copy_beside`].
+    #[inline(always)]
+    pub fn copy_beside<const STEP: i32>(&mut self, from: &Self) {
+        self.p.copy_beside::<STEP>(&from.p);
+        self.n.copy_beside::<STEP>(&from.n);
+        self.frame.s.copy_beside::<STEP>(&from.frame.s);
+        self.frame.t.copy_beside::<STEP>(&from.frame.t);
+        self.frame.n.copy_beside::<STEP>(&from.frame.n);
+        self.wi.copy_beside::<STEP>(&from.wi);
+        self.epsilon.copy_beside::<STEP>(&from.epsilon);
+        self.curvature.copy_beside::<STEP>(&from.curvature);
+        self.shape.copy_beside::<STEP>(&from.shape);
+        self.instance.copy_beside::<STEP>(&from.instance);
+        self.emissive.copy_beside::<STEP>(&from.emissive);
+        self.primitive.copy_beside::<STEP>(&from.primitive);
+        for k in 0..2 {
+            self.uv[k].copy_beside::<STEP>(&from.uv[k]);
+            self.barycentric[k].copy_beside::<STEP>(&from.barycentric[k]);
+        }
+        self.dp_du.copy_beside::<STEP>(&from.dp_du);
+        self.dp_dv.copy_beside::<STEP>(&from.dp_dv);
+    }
+
     /// [`Surface::leave`].
     #[inline(always)]
     pub fn leave(&self, direction: Lanes3) -> Lanes3 {

@@ -1,7 +1,6 @@
 //! One end's share of a difference: (J f(y) - f(x)) / D, D being the sum of both paths' densities.
 
-use super::half_vector::LastSegment;
-use crate::math::lanes::{Lanes, Lanes3};
+use crate::math::lanes::{Lanes, Lanes3, Mask};
 
 /// Contributions of sixteen base paths: f(x) before division by `density`, the sum over the sampling strategies.
 #[derive(Clone, Copy)]
@@ -39,10 +38,19 @@ impl LastSegments {
     /// Nothing is received.
     pub const NONE: Self = Self { contribution: Lanes3::ZERO, density: Lanes::ZERO };
 
-    /// Replaces one lane by the last segment of a single offset, if it has one.
-    pub fn set(&mut self, lane: usize, end: Option<LastSegment>) {
-        let Some(end) = end else { return };
-        self.contribution.set(lane, end.scattering * end.radiance * end.jacobian);
-        self.density.0[lane] = (end.light_pdf + end.pdf) * end.jacobian;
+    /// Copies one lane of others.
+    #[inline(always)]
+    pub fn copy(&mut self, to: usize, from: &Self, lane: usize) {
+        self.contribution.set(to, from.contribution.get(lane));
+        self.density.0[to] = from.density.0[lane];
+    }
+
+    /// Others in some lanes.
+    #[inline(always)]
+    pub fn replaced(self, others: &Self, lanes: Mask) -> Self {
+        Self {
+            contribution: lanes.select3(others.contribution, self.contribution),
+            density: lanes.select(others.density, self.density),
+        }
     }
 }

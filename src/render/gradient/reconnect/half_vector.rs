@@ -1,124 +1,164 @@
 //! Half-vector copies: the offset leaves its vertex as the base path leaves its own, by the same delta lobe, or mirrored or
 //! refracted about the same local half vector.
 
-use crate::math::{Rgb, Vec3, fresnel};
+use super::offsets::SurfacePacket;
+use crate::math::fresnel;
+use crate::math::lanes::{LANES, Lanes, Lanes3, Mask};
+use crate::scene::Scene;
 use crate::scene::bsdf::Lobe;
-use crate::scene::emitter::{LightPoint, Position};
-use crate::scene::{Scene, Surface};
+use crate::scene::closure::Evals;
+use crate::scene::packet::{Materials, Surfaces};
 
-/// The direction that an offset leaves its vertex by.
-#[derive(Clone, Copy)]
-pub struct Copied {
-    /// Local direction.
-    pub wo: Vec3,
-    /// f cos, or the factor of a delta lobe.
-    pub value: Rgb,
-    /// Density per solid angle, or probability of a delta lobe.
-    pub pdf: f32,
-    /// dω' / dω; 1 for delta lobes.
-    pub jacobian: f32,
+/// How sixteen base paths leave their vertices.
+pub struct Departures<'a> {
+    /// The vertices.
+    pub surfaces: &'a Surfaces,
+    /// Their materials.
+    pub materials: &'a Materials,
+    /// Lanes of the vertices, one for each of the active lanes of everything below.
+    pub lanes: &'a [usize],
+    /// Local directions that the paths come from.
+    pub wi: Lanes3,
+    /// Local directions that they leave by.
+    pub wo: Lanes3,
+    /// Lobes that they leave by.
+    pub lobes: [Lobe; LANES],
 }
 
-/// A segment of an offset that is not connected to its base path.
-#[derive(Clone, Copy)]
-pub struct Extension {
-    /// The direction.
-    pub copied: Copied,
-    /// The surface that the offset hits.
-    pub hit: Option<Surface>,
-    direction: Vec3,
-    delta: bool,
-}
-
-/// The direction by which `offset` is left when the base path leaves `base` along `wo` by the given lobe. `None` if the
-/// offset's material cannot scatter so.
-fn copy(scene: &Scene, base: &Surface, (wo, lobe): (Vec3, Lobe), offset: &Surface) -> Option<Copied> {
-    let bsdf = scene.bsdf(offset);
-    if lobe.is_delta() {
-        let delta = bsdf.delta(offset, offset.wi, lobe)?;
-        // If the base's material has several lobes of this kind (a blend), the inverse shift fails, so this one has to.
-        scene.bsdf(base).delta(base, base.wi, lobe)?;
-        return Some(Copied { wo: delta.wo, value: delta.value, pdf: delta.probability, jacobian: 1.0 });
-    }
-    let (wo, jacobian) = if base.wi.z * wo.z > 0.0 {
-        reflect(base.wi, wo, offset.wi)?
-    } else {
-        // The inverse shift refracts at the base's material, so both must have the same index of refraction.
-        let eta = bsdf.refraction().filter(|&eta| scene.bsdf(base).refraction() == Some(eta))?;
-        refract(base.wi, wo, offset.wi, if base.wi.z > 0.0 { eta } else { 1.0 / eta })?
-    };
-    let eval = bsdf.eval(offset, offset.wi, wo);
-    (eval.value != Rgb::ZERO && eval.pdf > 0.0).then_some(Copied { wo, value: eval.value, pdf: eval.pdf, jacobian })
-}
-
-/// Copies a direction and traces the offset's ray along it.
-pub fn extend(scene: &Scene, base: &Surface, left_by: (Vec3, Lobe), offset: &Surface) -> Option<Extension> {
-    let copied = copy(scene, base, left_by, offset)?;
-    let ray = offset.ray(copied.wo);
-    let (_, lobe) = left_by;
-    Some(Extension { copied, hit: scene.intersect(ray), direction: ray.direction, delta: lobe.is_delta() })
-}
-
-/// Mirrors `offset_wi` about the half vector of `wi` and `wo`; with the Jacobian dω' / dω. `None` when
-/// either pair of directions is on different sides of the surface.
-pub fn reflect(wi: Vec3, wo: Vec3, offset_wi: Vec3) -> Option<(Vec3, f32)> {
-    let h = (wi + wo).try_normalize()?;
-    let offset_wo = fresnel::reflect_about(offset_wi, h);
-    let jacobian = offset_wo.dot(h).abs() / wo.dot(h).abs();
-    let same_side = wi.z * wo.z > 0.0 && offset_wi.z * offset_wo.z > 0.0;
-    (same_side && jacobian > 0.0 && jacobian.is_finite()).then_some((offset_wo, jacobian))
-}
-
-/// Refracts `offset_wi` at the half vector that refracts `wi` into `wo`, and the change of solid angle dω' / dω. `eta` is
-/// the index of refraction on the side of `wo` over that on the side of `wi`. `None` under total reflection, and when
-/// the sides are not the same.
-pub fn refract(wi: Vec3, wo: Vec3, offset_wi: Vec3, eta: f32) -> Option<(Vec3, f32)> {
-    let sum = wi + wo * eta;
-    let h = sum.try_normalize()?;
-    let cos_i = offset_wi.dot(h);
-    let cos_t = (1.0 - (1.0 - cos_i * cos_i) / (eta * eta)).max(0.0).sqrt().copysign(cos_i);
-    let offset_wo = (h * (cos_i / eta - cos_t) - offset_wi / eta).try_normalize()?;
-    let growth = (offset_wi + offset_wo * eta).length_squared() / sum.length_squared();
-    let jacobian = growth * (wo.dot(h) / offset_wo.dot(h)).abs();
-    let same_sides = wi.z * offset_wi.z > 0.0 && wo.z * offset_wo.z > 0.0 && wi.z * wo.z < 0.0;
-    let refracts = wi.dot(h) * wo.dot(h) < 0.0;
-    let possible = same_sides && refracts && cos_t != 0.0 && cos_i * wi.dot(h) > 0.0;
-    (possible && jacobian > 0.0 && jacobian.is_finite()).then_some((offset_wo, jacobian))
-}
-
-/// The last segment of an offset, to an emitter.
-pub struct LastSegment {
-    /// f cos at the offset's vertex.
-    pub scattering: Rgb,
-    /// Density per solid angle of scattering along it, or probability of a delta lobe.
-    pub pdf: f32,
-    /// Density per solid angle of sampling the emitter point by next-event estimation; 0 after a delta lobe.
-    pub light_pdf: f32,
-    /// Radiance that the offset's vertex receives.
-    pub radiance: Rgb,
+/// Directions that sixteen offsets leave their vertices by.
+#[repr(align(64))]
+pub struct Copies {
+    /// Lanes whose offset's material scatters so.
+    pub possible: Mask,
+    /// Local directions.
+    pub wo: Lanes3,
+    /// f cos, or the factor of a delta lobe, times dω' / dω, which is 1 for delta lobes.
+    pub value: Lanes3,
+    /// Density per solid angle, or probability of a delta lobe, times dω' / dω.
+    pub pdf: Lanes,
     /// dω' / dω.
-    pub jacobian: f32,
+    pub jacobian: Lanes,
+    /// Lanes of delta lobes.
+    pub delta: Mask,
 }
 
-impl Extension {
-    /// The offset's last segment to the unoccluded ambient light.
-    pub fn to_ambient(&self) -> LastSegment {
-        let Copied { value, pdf, jacobian, .. } = self.copied;
-        LastSegment { scattering: value, pdf, light_pdf: 0.0, radiance: Rgb::ONE, jacobian }
+impl Copies {
+    /// The directions by which offsets leave their vertices when their base paths leave theirs so.
+    pub fn new(scene: &Scene, base: &Departures, offset: &SurfacePacket) -> Self {
+        let active = Mask::first(base.lanes.len());
+        let mut delta = Mask::NONE;
+        active.lanes().for_each(|lane| delta.set(lane, base.lobes[lane].is_delta()));
+        let mut copies = Self::of_smooth(scene, base, offset, active & !delta);
+        if !delta.any() {
+            return copies;
+        }
+        copies.delta = delta;
+        for lobe in [Lobe::DeltaReflect, Lobe::DeltaTransmit, Lobe::Null] {
+            let mut lanes = Mask::NONE;
+            delta.lanes().for_each(|lane| lanes.set(lane, base.lobes[lane] == lobe));
+            if lanes.any() {
+                copies.add_deltas(scene, (base, lobe), offset, lanes);
+            }
+        }
+        copies
     }
 
-    /// The offset's last segment when the base path's ends on the emitter point `target`: it has to end on an emitter, too,
-    /// and at infinity only if the base path does.
-    pub fn end(&self, scene: &Scene, offset: &Surface, target: &LightPoint) -> Option<LastSegment> {
-        let far = matches!(target.position, Position::Infinity { .. });
-        let point = match &self.hit {
-            Some(hit) if !far => scene.light_point(hit)?,
-            None if far => scene.environment(self.direction)?,
-            _ => return None,
-        };
-        let light_pdf = if self.delta { 0.0 } else { scene.emitter_pdf(offset.p, &point) };
-        let radiance = scene.radiance(&point, -self.direction);
-        let Copied { value, pdf, jacobian, .. } = self.copied;
-        Some(LastSegment { scattering: value, pdf, light_pdf, radiance, jacobian })
+    /// Copies of directions of smooth lobes.
+    fn of_smooth(scene: &Scene, base: &Departures, offset: &SurfacePacket, smooth: Mask) -> Self {
+        let SurfacePacket { surfaces, materials } = offset;
+        let mut directions = mirrored(base, surfaces);
+        let through = smooth & !(base.wi.z * base.wo.z).greater(Lanes::ZERO);
+        if through.any() {
+            let (eta, alike) = indices(scene, base, surfaces, through);
+            let refracted = refract(base.wi, base.wo, surfaces.wi, eta);
+            let (wo, jacobian, possible) = directions;
+            directions = (
+                through.select3(refracted.0, wo),
+                through.select(refracted.1, jacobian),
+                (possible & !through) | (refracted.2 & alike),
+            );
+        }
+        let (wo, jacobian, possible) = directions;
+        let possible = possible & smooth;
+        let Evals { value, pdf } =
+            if possible.any() { materials.eval(scene, surfaces, (surfaces.wi, wo), possible) } else { Evals::ZERO };
+        let possible = possible & value.nonzero() & pdf.greater(Lanes::ZERO);
+        Self { possible, wo, value: value * jacobian, pdf: pdf * jacobian, jacobian, delta: Mask::NONE }
     }
+
+    /// Adds the lanes that leave by a delta lobe.
+    fn add_deltas(&mut self, scene: &Scene, (base, lobe): (&Departures, Lobe), offset: &SurfacePacket, lanes: Mask) {
+        let SurfacePacket { surfaces, materials } = offset;
+        let deltas = materials.deltas(scene, surfaces, (surfaces.wi, lobe), lanes);
+        let mut found = lanes & deltas.probability.greater(Lanes::ZERO);
+        for lane in found.lanes() {
+            // If the base's material has several lobes of this kind (a blend), the inverse shift fails, so this one has to.
+            let from = base.lanes[lane];
+            if !base.materials.are_closures().get(from) {
+                let surface = base.surfaces.get(from);
+                found.set(lane, scene.bsdf(&surface).delta(&surface, surface.wi, lobe).is_some());
+            }
+        }
+        self.possible = self.possible | found;
+        self.wo = lanes.select3(deltas.wo, self.wo);
+        self.value = lanes.select3(deltas.value, self.value);
+        self.pdf = lanes.select(deltas.probability, self.pdf);
+        self.jacobian = lanes.select(Lanes::ONE, self.jacobian);
+    }
+}
+
+vectorized! {
+    fn mirrored(base: &Departures, offset: &Surfaces) -> (Lanes3, Lanes, Mask) {
+        reflect(base.wi, base.wo, offset.wi)
+    }
+}
+
+/// Indices of refraction on the sides that some base paths go to over those on the sides that they come from, and the lanes in
+/// which the offset's material has the same: the inverse shift refracts at the base's.
+fn indices(scene: &Scene, base: &Departures, offset: &Surfaces, lanes: Mask) -> (Lanes, Mask) {
+    let (mut eta, mut alike) = (Lanes::ONE, Mask::NONE);
+    let index = |surfaces: &Surfaces, lane: usize| scene.shapes()[surfaces.shape.0[lane] as usize].bsdf.refraction();
+    for lane in lanes.lanes() {
+        let (there, here) = (index(offset, lane), index(base.surfaces, base.lanes[lane]));
+        if let Some(index) = there.filter(|_| there == here) {
+            alike.set(lane, true);
+            eta.0[lane] = if base.wi.z.0[lane] > 0.0 { index } else { 1.0 / index };
+        }
+    }
+    (eta, alike)
+}
+
+/// Mirrors `offset_wi` about the half vectors of `wi` and `wo`; with the Jacobians dω' / dω. The mask leaves out the lanes where
+/// either pair of directions is on different sides of the surface.
+#[inline(always)]
+pub fn reflect<const N: usize>(wi: Lanes3<N>, wo: Lanes3<N>, offset_wi: Lanes3<N>) -> (Lanes3<N>, Lanes<N>, Mask<N>) {
+    let h = (wi + wo).normalize_or(Lanes3::ZERO);
+    let offset_wo = fresnel::lanes::reflect_about(offset_wi, h);
+    let jacobian = offset_wo.dot(h).abs() / wo.dot(h).abs();
+    let same_side = (wi.z * wo.z).greater(Lanes::ZERO) & (offset_wi.z * offset_wo.z).greater(Lanes::ZERO);
+    (offset_wo, jacobian, same_side & jacobian.greater(Lanes::ZERO) & jacobian.finite())
+}
+
+/// Refracts `offset_wi` at the half vectors that refract `wi` into `wo`, with the changes of solid angle dω' / dω. `eta` is
+/// the index of refraction on the side of `wo` over that on the side of `wi`. The mask leaves out total reflection, and lanes in
+/// which the sides are not the same.
+#[inline(always)]
+pub fn refract<const N: usize>(
+    wi: Lanes3<N>,
+    wo: Lanes3<N>,
+    offset_wi: Lanes3<N>,
+    eta: Lanes<N>,
+) -> (Lanes3<N>, Lanes<N>, Mask<N>) {
+    let (zero, one) = (Lanes::ZERO, Lanes::ONE);
+    let sum = wi + wo * eta;
+    let h = sum.normalize_or(Lanes3::ZERO);
+    let cos_i = offset_wi.dot(h);
+    let cos_t = (one - (one - cos_i * cos_i) / (eta * eta)).max(zero).sqrt().copysign(cos_i);
+    let offset_wo = (h * (cos_i / eta - cos_t) - offset_wi * (one / eta)).normalize_or(Lanes3::ZERO);
+    let offset_sum = offset_wi + offset_wo * eta;
+    let growth = offset_sum.dot(offset_sum) / sum.dot(sum);
+    let jacobian = growth * (wo.dot(h) / offset_wo.dot(h)).abs();
+    let same_sides = (wi.z * offset_wi.z).greater(zero) & (wo.z * offset_wo.z).greater(zero) & (wi.z * wo.z).less(zero);
+    let refracts = (wi.dot(h) * wo.dot(h)).less(zero) & cos_t.abs().greater(zero) & (cos_i * wi.dot(h)).greater(zero);
+    (offset_wo, jacobian, same_sides & refracts & jacobian.greater(zero) & jacobian.finite())
 }

@@ -12,14 +12,20 @@ mod continuation;
 mod difference;
 mod direct;
 mod emission;
+mod extension;
 pub mod half_vector;
 mod offsets;
+mod received;
 mod segment;
 mod states;
 
+use std::ops::AddAssign;
+
 use self::direct::sampled_emitters;
-use self::offsets::{MISS, OUT_OF_FILM, OffsetSurfaces};
-use self::segment::{NextVertices, OffsetSegment, Scratch, ShiftContext};
+use self::extension::{Extended, Extensions};
+use self::offsets::{MISS, OUT_OF_FILM, OffsetSurfaces, SurfacePacket};
+use self::received::ReceivedLight;
+use self::segment::{NextVertices, Segment, ShiftContext};
 use self::states::{Kind, LevelStates, Prefix, States};
 use super::{ShiftKind, ShiftMapping};
 use crate::math::Rgb;
@@ -48,10 +54,15 @@ const EXTENSION: f32 = 1.8;
 struct Reconnect {
     threshold: f32,
     ambient: bool,
+    received: ReceivedLight,
     offsets: OffsetSurfaces,
     states: LevelStates,
     next: LevelStates,
-    scratch: Scratch,
+    extensions: Extensions,
+    /// Surfaces of the unconnected offsets of a packet.
+    offset: SurfacePacket,
+    /// Offsets that were connected in this wave.
+    connected: u32,
 }
 
 /// One end's share of the differences over sixteen segments.
@@ -61,6 +72,18 @@ struct SegmentDifferences {
     color: Lanes3,
     /// Differences of the ambient light, if they are recorded.
     ambient: Lanes3,
+}
+
+impl SegmentDifferences {
+    const NONE: Self = Self { color: Lanes3::ZERO, ambient: Lanes3::ZERO };
+}
+
+impl AddAssign for SegmentDifferences {
+    #[inline(always)]
+    fn add_assign(&mut self, other: Self) {
+        self.color += other.color;
+        self.ambient += other.ambient;
+    }
 }
 
 impl ShiftMapping for Reconnect {
@@ -75,48 +98,60 @@ impl ShiftMapping for Reconnect {
         record: &mut PathRecord,
         edges: &mut HalfEdges,
     ) {
-        let packets = camera.pixels.len().div_ceil(LANES);
-        if self.ambient {
-            // The ambient light reaches every vertex.
-            record.lit_length.fill(u32::MAX);
-        }
-        self.offsets.start(tracer.scene, camera, edges, &record.levels[0][..packets]);
-        self.start(packets, &record.lit_length, edges);
-        let PathRecord { levels, packets: counts, lit_length, .. } = record;
+        self.received.collect(record, self.ambient);
+        let PathRecord { levels, packets: counts, .. } = &*record;
+        let base = &levels[0][..counts[0]];
+        self.offsets.start((tracer.scene, self.threshold), camera, edges, base);
+        self.start(camera.pixels.len(), edges);
+        let received = std::mem::take(&mut self.received);
+        (self.connected, self.extensions.count) = (0, 0);
         for (depth, &count) in counts.iter().enumerate() {
+            if !self.states.any_open() {
+                break;
+            }
             let below = counts.get(depth + 1).map_or(&[][..], |&packets| &levels[depth + 1][..packets]);
             self.next.reset(below.len(), edges.most());
-            let context = ShiftContext {
-                scene: tracer.scene,
-                threshold: self.threshold,
-                ambient: self.ambient,
-                base: &levels[0][..packets],
-                below,
-            };
             for (packet, vertices) in levels[depth][..count].iter().enumerate() {
-                self.shift_packet(&context, (depth as u32, packet), vertices, lit_length, edges);
+                let context = ShiftContext {
+                    scene: tracer.scene,
+                    threshold: self.threshold,
+                    ambient: self.ambient,
+                    base,
+                    below: (below, received.at(depth + 1)),
+                };
+                let active = vertices.hit & received.at(depth)[packet].any();
+                if active.any() {
+                    self.shift_packet(&context, (packet, vertices, active), edges);
+                }
             }
             std::mem::swap(&mut self.states, &mut self.next);
+            self.offsets.advance();
         }
-        let Scratch { connected, extended, .. } = &mut self.scratch;
-        record.work.offsets +=
-            CONNECTION * std::mem::take(connected) as f32 + EXTENSION * std::mem::take(extended) as f32;
+        self.received = received;
+        record.work.offsets += CONNECTION * self.connected as f32 + EXTENSION * self.extensions.count as f32;
     }
 }
 
 impl Reconnect {
     /// Starts the offsets of all paths that receive light: unconnected, where the camera sees a surface.
-    fn start(&mut self, packets: usize, lit_length: &[u32], edges: &HalfEdges) {
-        self.states.reset(packets, edges.most());
+    fn start(&mut self, paths: usize, edges: &mut HalfEdges) {
+        let received = self.received.at(0);
+        self.states.reset(received.len(), edges.most());
         let start = Prefix { throughput: Rgb::ONE, ratio: 1.0 };
-        for (sample, _) in lit_length.iter().enumerate().filter(|(_, length)| **length > 0) {
-            for slot in 0..edges.degree(sample) {
-                let vertex_index = self.offsets.first(sample, slot);
-                let (states, lane) = self.states.at(sample as u32, slot);
-                match vertex_index {
+        for path in 0..paths {
+            let (light, lane) = (&received[path / LANES], path % LANES);
+            let (color, ambient) = (light.total().get(lane), light.ambient.get(lane));
+            if color == Rgb::ZERO && ambient == Rgb::ZERO {
+                continue;
+            }
+            for slot in 0..edges.degree(path) {
+                match self.offsets.first(path, slot) {
                     OUT_OF_FILM => {}
-                    MISS => states.fail(lane),
-                    vertex_index => states.set_unconnected(lane, start, vertex_index),
+                    MISS => edges.add(path, slot, (-color, Some(-ambient))),
+                    vertex_index => {
+                        let (states, lane) = self.states.at(path as u32, slot);
+                        states.set_unconnected(lane, start, vertex_index);
+                    }
                 }
             }
         }
@@ -126,30 +161,31 @@ impl Reconnect {
     fn shift_packet(
         &mut self,
         context: &ShiftContext,
-        (depth, packet): (u32, usize),
-        vertices: &Vertices,
-        lit_length: &[u32],
+        (packet, vertices, active): (usize, &Vertices, Mask),
         edges: &mut HalfEdges,
     ) {
-        // The part of a path behind its last lit vertex contributes nothing: the other ends of the edges account for
-        // whatever shifted copies of it would receive.
-        let reaches = |id: u32, depth: u32| lit_length[id as usize] > depth;
-        let mut reached = vertices.hit;
-        vertices.hit.lanes().for_each(|lane| reached.set(lane, reaches(vertices.id.0[lane], depth)));
-        if !reached.any() {
-            return;
-        }
-        let slots = reached.lanes().map(|lane| edges.degree(vertices.id.0[lane] as usize)).max().unwrap_or(0);
-        let unconnected = self.states.unconnected(packet, slots);
-        let next = NextVertices::new(context, vertices, reached, unconnected, |id| reaches(id, depth + 1));
+        let slots = active.lanes().map(|lane| edges.degree(vertices.id.0[lane] as usize)).max().unwrap_or(0);
+        let Some(unconnected) = self.states.unconnected_of_open(packet, slots) else { return };
+        let next = NextVertices::new(context, vertices, active & unconnected);
+        let at = (context, vertices, active);
+        self.extensions.to_lights(at, self.states.for_light(packet, slots), &mut self.offsets);
+        self.extensions.to_vertices(at, &next, self.states.for_scatter(packet, slots), &mut self.offsets);
         for slot in 0..slots {
-            let (for_light, for_scatter) = self.states.get(packet, slot);
-            let inside = reached & for_light.inside();
-            let step = Step { context, vertices, next: &next, active: reached, slot };
-            let to = (&mut self.next, &mut self.offsets);
-            let found = shift_segment(&step, &mut self.scratch, (for_light, for_scatter), to);
-            for lane in inside.lanes() {
-                let ambient = if self.ambient { found.ambient.get(lane) } else { Rgb::ZERO };
+            let states = self.states.get(packet, slot);
+            let open = active & (states.0.open() | states.1.open());
+            if !open.any() {
+                continue;
+            }
+            let [light, scatter] = [states.0, states.1].map(|states| open & states.are(Kind::Unconnected));
+            if (light | scatter).any() {
+                let vertex_index = light.select_bits(states.0.vertex_index, states.1.vertex_index);
+                self.offsets.load(context.base, vertex_index, light | scatter, &mut self.offset);
+            }
+            let step = Step { context, vertices, next: &next, offset: &self.offset, active: open, slot };
+            let connected = &mut self.connected;
+            let found = shift_segment(&step, states, self.extensions.get(slot), (&mut self.next, connected));
+            for lane in open.lanes() {
+                let ambient = self.ambient.then(|| found.ambient.get(lane));
                 edges.add(vertices.id.0[lane] as usize, slot, (found.color.get(lane), ambient));
             }
         }
@@ -161,34 +197,36 @@ struct Step<'a> {
     context: &'a ShiftContext<'a>,
     vertices: &'a Vertices,
     next: &'a NextVertices,
+    /// Surfaces of the unconnected offsets.
+    offset: &'a SurfacePacket,
     active: Mask,
     /// Number of the half-edge among those of each path.
     slot: usize,
 }
 
 vectorized! {
-    /// Returns the differences of the light sampled at the vertices and of the emitters hit next, and sets the states of the
-    /// offsets at the next vertices.
+    /// Returns the differences of the light sampled at the vertices, of the emitters hit next, and of everything behind offsets
+    /// that are closed, and sets the states of the offsets at the next vertices.
     fn shift_segment(
         step: &Step,
-        scratch: &mut Scratch,
         (for_light, for_scatter): (&States, &States),
-        (next_states, offsets): (&mut LevelStates, &mut OffsetSurfaces),
+        (to_light, to_vertex): (&Extended, &Extended),
+        (next_states, connected): (&mut LevelStates, &mut u32),
     ) -> SegmentDifferences {
-        let Step { context, vertices, next, active, slot } = *step;
-        scratch.load_offsets(context, offsets, (for_light, for_scatter), active);
-        let lit = active & vertices.lit & for_light.inside();
-        scratch.connected += (lit & for_light.are(Kind::Unconnected)).count();
-        let sampled =
-            if lit.any() { sampled_emitters(context, vertices, scratch.offset(), for_light, lit) } else { Lanes3::ZERO };
-        let ambient = if context.ambient { active } else { Mask::NONE };
-        let leaving = active & for_scatter.inside() & vertices.scattered & (next.exists | vertices.hits_emitter | ambient);
-        if !leaving.any() {
-            return SegmentDifferences { color: sampled, ambient: Lanes3::ZERO };
+        let Step { context, vertices, next, offset, active, slot } = *step;
+        let lit = active & vertices.lit & for_light.open();
+        *connected += (lit & for_light.are(Kind::Unconnected)).count();
+        let mut differences = SegmentDifferences::NONE;
+        if lit.any() {
+            differences.color = sampled_emitters(context, vertices, (offset, to_light), for_light, lit);
         }
-        let segment = OffsetSegment::new(context, vertices, scratch, for_scatter, leaving);
-        let hit = segment.emission_differences(context);
-        segment.continue_offsets(context, next, (next_states, slot), offsets);
-        SegmentDifferences { color: sampled + hit.color, ambient: hit.ambient }
+        let leaving = context.leaving(vertices, next, active & for_scatter.open());
+        if leaving.any() {
+            let segment = Segment::new(context, (vertices, next), (offset, to_vertex), for_scatter, leaving);
+            *connected += segment.connectable.count();
+            differences += segment.emission_differences(context);
+            differences += segment.continue_offsets(context, (next_states, slot));
+        }
+        differences
     }
 }

@@ -1,12 +1,14 @@
 //! Surfaces of offset paths: their camera hits, most of which are those of neighbouring base paths, and the hits of
 //! unconnected offsets.
 
-use crate::math::lanes::{LANES, Mask};
+use super::segment::ShiftContext;
+use super::states::States;
+use crate::math::lanes::{Bits, LANES, Lanes, Mask};
 use crate::render::camera::CameraSamples;
 use crate::render::half_edges::HalfEdges;
 use crate::render::vertices::Vertices;
 use crate::scene::packet::{Materials, Rays, Surfaces};
-use crate::scene::{Scene, Surface};
+use crate::scene::Scene;
 
 /// Vertex index of an offset that hits nothing, and of pixels of the window without an index yet.
 pub const MISS: u32 = u32::MAX;
@@ -22,14 +24,36 @@ pub struct SurfacePacket {
     pub materials: Materials,
 }
 
-/// All surfaces of the offsets of a wave. A vertex index counts the camera hits of the base paths first, then the surfaces
-/// that were traced for offsets.
+impl SurfacePacket {
+    /// Copies one lane of others.
+    #[inline(always)]
+    pub fn copy(&mut self, to: usize, (surfaces, materials, lane): (&Surfaces, &Materials, usize)) {
+        self.surfaces.copy(to, surfaces, lane);
+        self.materials.copy(to, materials, lane);
+    }
+
+    /// [`Lanes::copy_beside`](crate::math::lanes::Lanes::copy_beside).
+    #[inline(always)]
+    fn copy_beside<const STEP: i32>(&mut self, (surfaces, materials): (&Surfaces, &Materials)) {
+        self.surfaces.copy_beside::<STEP>(surfaces);
+        self.materials.copy_beside::<STEP>(materials);
+    }
+}
+
+/// Surfaces of the offsets of a wave at one depth. A vertex index counts the camera hits of the base paths first, then those that
+/// were traced for offsets, then the surfaces that offsets were extended to.
 #[derive(Default)]
 pub struct OffsetSurfaces {
-    traced: Vec<SurfacePacket>,
+    /// Camera hits, and which lanes of them there are.
+    camera: Vec<SurfacePacket>,
     hits: Vec<Mask>,
-    /// Lanes of `traced` that are in use, including those of packets that are not full.
-    lanes_used: usize,
+    camera_used: usize,
+    /// Vertices of extended offsets at this depth and at the next.
+    extended: Vec<SurfacePacket>,
+    next: Vec<SurfacePacket>,
+    next_used: usize,
+    /// Whether all vertices of this depth count as diffuse.
+    all_diffuse: bool,
     /// Vertex indices of the camera hits, by sample and number of the half-edge.
     first: Vec<u32>,
     /// Half-edges that there is room for at every sample.
@@ -42,8 +66,14 @@ pub struct OffsetSurfaces {
 
 impl OffsetSurfaces {
     /// Finds the camera hits of all offsets of a wave; `level` holds those of the base paths.
-    pub fn start(&mut self, scene: &Scene, camera: &CameraSamples, edges: &HalfEdges, level: &[Vertices]) {
-        self.lanes_used = 0;
+    pub fn start(
+        &mut self,
+        (scene, threshold): (&Scene, f32),
+        camera: &CameraSamples,
+        edges: &HalfEdges,
+        level: &[Vertices],
+    ) {
+        (self.camera_used, self.next_used) = (0, 0);
         self.slots = edges.most();
         self.first.clear();
         self.first.resize(camera.pixels.len() * self.slots, OUT_OF_FILM);
@@ -52,6 +82,11 @@ impl OffsetSurfaces {
         } else {
             self.reuse_camera_hits(scene, camera, edges, level);
         }
+        let threshold = Lanes::splat(threshold);
+        let glossy = |hit: Mask, materials: &Materials| (hit & !materials.roughness().greater(threshold)).any();
+        let camera = self.camera.iter().zip(&self.hits).take(self.camera_used);
+        self.all_diffuse = !level.iter().any(|vertices| glossy(vertices.hit, &vertices.materials))
+            && !camera.into_iter().any(|(packet, hit)| glossy(*hit, &packet.materials));
     }
 
     /// Vertex index of an offset's camera hit, [`MISS`] or [`OUT_OF_FILM`].
@@ -59,39 +94,57 @@ impl OffsetSurfaces {
         self.first[sample * self.slots + slot]
     }
 
-    /// Keeps the hit of an unconnected offset and returns its vertex index; `base` is the number of packets of camera hits.
-    pub fn push(&mut self, scene: &Scene, base: usize, surface: &Surface) -> u32 {
-        let lane = self.lanes_used % LANES;
-        let packet = self.next_packet();
-        packet.surfaces.set(lane, surface);
-        let (mut one, mut materials) = (Mask::NONE, Materials::default());
-        one.set(lane, true);
-        materials.evaluate(scene, &packet.surfaces, one);
-        packet.materials.copy(lane, &materials, lane);
-        self.lanes_used += 1;
-        (base * LANES + self.lanes_used - 1) as u32
+    /// Goes on to the next depth: the vertices that offsets were extended to are now theirs.
+    pub fn advance(&mut self) {
+        std::mem::swap(&mut self.extended, &mut self.next);
+        (self.next_used, self.all_diffuse) = (0, false);
     }
 
-    /// The surface at a vertex index, as packet and lane; `level` holds the camera hits of the base paths.
+    /// Sixteen vertices for extended offsets, and the index of the first; `base` is the number of packets of base paths.
+    pub fn next_packet(&mut self, base: usize) -> (u32, &mut SurfacePacket) {
+        let packet = self.next_used;
+        if packet == self.next.len() {
+            self.next.push(SurfacePacket::default());
+        }
+        self.next_used += 1;
+        (((base + self.camera_used + packet) * LANES) as u32, &mut self.next[packet])
+    }
+
+    /// Lanes whose offset's vertex counts as diffuse.
+    pub fn diffuse(&self, context: &ShiftContext, states: &States, lanes: Mask) -> Mask {
+        if self.all_diffuse {
+            return lanes;
+        }
+        let mut diffuse = Mask::NONE;
+        for lane in lanes.lanes() {
+            let (_, materials, at) = self.at(context.base, states.vertex_index.0[lane]);
+            diffuse.set(lane, materials.roughness().0[at] > context.threshold);
+        }
+        diffuse
+    }
+
+    /// Loads the surfaces at some vertex indices; `level` holds the camera hits of the base paths.
+    pub fn load(&self, level: &[Vertices], vertex_index: Bits, lanes: Mask, to: &mut SurfacePacket) {
+        load(self, level, (vertex_index, lanes), to);
+    }
+
+    /// The surface at a vertex index, as packet and lane.
     #[inline(always)]
     pub fn at<'a>(&'a self, level: &'a [Vertices], vertex_index: u32) -> (&'a Surfaces, &'a Materials, usize) {
-        let (packet, lane) = (vertex_index as usize / LANES, vertex_index as usize % LANES);
-        match level.get(packet) {
-            Some(vertices) => (&vertices.surfaces, &vertices.materials, lane),
-            None => {
-                let SurfacePacket { surfaces, materials } = &self.traced[packet - level.len()];
-                (surfaces, materials, lane)
-            }
-        }
+        let (surfaces, materials) = self.packet(level, vertex_index as usize / LANES);
+        (surfaces, materials, vertex_index as usize % LANES)
     }
 
-    fn next_packet(&mut self) -> &mut SurfacePacket {
-        let packet = self.lanes_used / LANES;
-        if packet == self.traced.len() {
-            self.traced.push(SurfacePacket::default());
-            self.hits.push(Mask::NONE);
-        }
-        &mut self.traced[packet]
+    #[inline(always)]
+    fn packet<'a>(&'a self, level: &'a [Vertices], packet: usize) -> (&'a Surfaces, &'a Materials) {
+        let Some(traced) = packet.checked_sub(level.len()) else {
+            return (&level[packet].surfaces, &level[packet].materials);
+        };
+        let SurfacePacket { surfaces, materials } = match traced.checked_sub(self.camera_used) {
+            None => &self.camera[traced],
+            Some(extended) => &self.extended[extended],
+        };
+        (surfaces, materials)
     }
 
     /// With a pinhole the camera ray of an offset is that of the neighbour's base path: only those of the pixels around the
@@ -150,7 +203,7 @@ impl OffsetSurfaces {
                 let step = |lane: usize| edges.step(first + lane, slot);
                 let steps: Vec<_> = (0..count).map(|lane| step(lane).unwrap_or_default()).collect();
                 let rays = camera.rays(scene, first, hashes, &steps);
-                let packet = base + self.lanes_used / LANES;
+                let packet = base + self.camera_used;
                 let hit = self.intersect(scene, &rays, count);
                 for (lane, &pixel) in camera.pixels[first..].iter().take(count).enumerate() {
                     let index = if hit.get(lane) { (packet * LANES + lane) as u32 } else { MISS };
@@ -162,15 +215,49 @@ impl OffsetSurfaces {
     }
 
     fn intersect(&mut self, scene: &Scene, rays: &Rays, count: usize) -> Mask {
-        let packet = self.next_packet();
+        if self.camera_used == self.camera.len() {
+            self.camera.push(SurfacePacket::default());
+            self.hits.push(Mask::NONE);
+        }
+        let packet = &mut self.camera[self.camera_used];
         let mut hit = scene.intersect_packet(rays, Mask::first(count), true, &mut packet.surfaces);
         if scene.integrator().pass_emitters {
             scene.pass_emitters(rays, &mut hit, &mut packet.surfaces);
         }
         packet.materials.evaluate(scene, &packet.surfaces, hit);
-        let at = self.lanes_used / LANES;
-        self.hits[at] = hit;
-        self.lanes_used += LANES;
+        self.hits[self.camera_used] = hit;
+        self.camera_used += 1;
         hit
+    }
+}
+
+vectorized! {
+    /// Loads surfaces lane by lane, but all at once those that lie side by side as the lanes do: neighbours in a row of pixels, or the
+    /// rows above and below.
+    fn load(
+        offsets: &OffsetSurfaces,
+        level: &[Vertices],
+        (vertex_index, lanes): (Bits, Mask),
+        to: &mut SurfacePacket,
+    ) {
+        let mut left = lanes;
+        // A lane that is neither the first nor the last lies in one packet with its neighbours.
+        let middle = LANES / 2;
+        let (packet, at) = (vertex_index.0[middle] / LANES as u32, vertex_index.0[middle] % LANES as u32);
+        let step = at as i32 - middle as i32;
+        if lanes.get(middle) && step.abs() <= 1 {
+            let steps = Bits(std::array::from_fn(|lane| vertex_index.0[lane].wrapping_sub(lane as u32)));
+            let packets = vertex_index.map(|index| index / LANES as u32);
+            left = lanes & !(steps.equal(steps.0[middle]) & packets.equal(packet));
+            let from = offsets.packet(level, packet as usize);
+            match step {
+                0 => to.copy_beside::<0>(from),
+                1 => to.copy_beside::<1>(from),
+                _ => to.copy_beside::<-1>(from),
+            }
+        }
+        for lane in left.lanes() {
+            to.copy(lane, offsets.at(level, vertex_index.0[lane]));
+        }
     }
 }

@@ -37,28 +37,17 @@ impl Prefixes {
     }
 }
 
-impl Prefix {
-    /// Appends a segment with the given factors; `None` if it carries nothing.
-    pub fn extended(self, value: Rgb, ratio: f32) -> Option<Self> {
-        let next = Self { throughput: self.throughput * value, ratio: self.ratio * ratio };
-        (next.throughput != Rgb::ZERO && next.ratio > 0.0).then_some(next)
-    }
-}
-
 /// State of an offset at a vertex of its base path.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(u32)]
 pub enum Kind {
-    /// The offset's pixel lies outside the film.
-    OutOfFilm,
-    /// The shift has failed.
-    Failed,
+    /// Nothing is left to be added: the offset's pixel lies outside the film, the shift has failed, or the offset is the base path
+    /// from an earlier vertex on.
+    Closed,
     /// The offset has a vertex of its own.
     Unconnected,
     /// The offset reaches the base path's vertex from a vertex of its own.
     JustConnected,
-    /// The offset is the base path from an earlier vertex on.
-    Connected,
 }
 
 /// Sixteen states.
@@ -88,10 +77,10 @@ impl States {
         self.kind.equal(kind as u32)
     }
 
-    /// Lanes whose pixel and neighbour both lie in the film.
+    /// Lanes with something left to be added.
     #[inline(always)]
-    pub fn inside(&self) -> Mask {
-        !self.are(Kind::OutOfFilm)
+    pub fn open(&self) -> Mask {
+        !self.are(Kind::Closed)
     }
 
     #[inline(always)]
@@ -103,16 +92,16 @@ impl States {
 
     /// Copies one lane of other states.
     pub fn copy(&mut self, lane: usize, from: &Self) {
-        self.set(lane, Kind::Failed, from.prefix.get(lane));
+        self.set(lane, Kind::Closed, from.prefix.get(lane));
         self.kind.0[lane] = from.kind.0[lane];
         self.vertex_index.0[lane] = from.vertex_index.0[lane];
         self.wi.set(lane, from.wi.get(lane));
     }
 
-    /// The shift of one lane has failed.
+    /// Nothing is left to be added in one lane.
     #[inline(always)]
-    pub fn fail(&mut self, lane: usize) {
-        self.kind.0[lane] = Kind::Failed as u32;
+    pub fn close(&mut self, lane: usize) {
+        self.kind.0[lane] = Kind::Closed as u32;
     }
 
     /// One lane has a vertex of its own.
@@ -126,12 +115,6 @@ impl States {
     pub fn set_just_connected(&mut self, lane: usize, prefix: Prefix, wi: Vec3) {
         self.set(lane, Kind::JustConnected, prefix);
         self.wi.set(lane, wi);
-    }
-
-    /// One lane is its base path from an earlier vertex on.
-    #[inline(always)]
-    pub fn set_connected(&mut self, lane: usize, prefix: Prefix) {
-        self.set(lane, Kind::Connected, prefix);
     }
 }
 
@@ -148,12 +131,14 @@ pub struct LevelStates {
     differs: Vec<Mask>,
     /// Half-edges that there is room for at every vertex.
     slots: usize,
+    /// Whether any offset is open.
+    open: bool,
 }
 
 impl LevelStates {
-    /// States of the given number of packets, with room for so many half-edges of each path, all of them out of the film.
+    /// States of the given number of packets, with room for so many half-edges of each path, all of them closed.
     pub fn reset(&mut self, packets: usize, slots: usize) {
-        self.slots = slots;
+        (self.slots, self.open) = (slots, false);
         let count = packets * slots;
         self.for_light.resize_with(count.max(self.for_light.len()), Default::default);
         self.for_scatter.resize_with(count.max(self.for_scatter.len()), Default::default);
@@ -162,29 +147,50 @@ impl LevelStates {
         self.for_light[..count].iter_mut().for_each(|states| states.kind = Bits::ZERO);
     }
 
-    /// States of a packet across half-edges of one number: for light and for the continuation.
-    pub fn get(&mut self, packet: usize, slot: usize) -> (&States, &States) {
-        let at = packet * self.slots + slot;
-        let (states, differs) = (&self.for_light[at], self.differs[at]);
-        if !differs.any() {
-            return (states, states);
-        }
-        let for_scatter = &mut self.for_scatter[at];
-        for lane in (!differs).lanes() {
-            for_scatter.copy(lane, states);
-        }
-        (states, for_scatter)
+    /// Whether anything is left to be added anywhere.
+    pub fn any_open(&self) -> bool {
+        self.open
     }
 
-    /// Lanes of a packet with an offset, across any of the first half-edges, that continues from a vertex of its own.
-    pub fn unconnected(&mut self, packet: usize, slots: usize) -> Mask {
-        (0..slots).fold(Mask::NONE, |all, slot| all | self.get(packet, slot).1.are(Kind::Unconnected))
+    /// States of a packet across half-edges of one number: for light and for the continuation.
+    pub fn get(&self, packet: usize, slot: usize) -> (&States, &States) {
+        let at = packet * self.slots + slot;
+        (&self.for_light[at], if self.differs[at].any() { &self.for_scatter[at] } else { &self.for_light[at] })
+    }
+
+    /// States of a packet for light, across the first half-edges.
+    pub fn for_light(&self, packet: usize, slots: usize) -> impl Iterator<Item = &States> {
+        (0..slots).map(move |slot| self.get(packet, slot).0)
+    }
+
+    /// States of a packet for the continuation, across the first half-edges.
+    pub fn for_scatter(&self, packet: usize, slots: usize) -> impl Iterator<Item = &States> {
+        (0..slots).map(move |slot| self.get(packet, slot).1)
+    }
+
+    /// Completes the states of a packet for the continuation, across any of the first half-edges. Returns the lanes with an
+    /// offset that has a vertex of its own, or nothing where all offsets are closed.
+    pub fn unconnected_of_open(&mut self, packet: usize, slots: usize) -> Option<Mask> {
+        let (mut open, mut unconnected) = (Mask::NONE, Mask::NONE);
+        for slot in 0..slots {
+            let at = packet * self.slots + slot;
+            let (states, differs) = (&self.for_light[at], self.differs[at]);
+            (open, unconnected) = (open | states.open(), unconnected | states.are(Kind::Unconnected));
+            if differs.any() {
+                let for_scatter = &mut self.for_scatter[at];
+                (!differs).lanes().for_each(|lane| for_scatter.copy(lane, states));
+                open = open | for_scatter.open();
+                unconnected = unconnected | for_scatter.are(Kind::Unconnected);
+            }
+        }
+        open.any().then_some(unconnected)
     }
 
     /// The state at a vertex for light and, where it does not differ, for the continuation.
     #[inline(always)]
     pub fn at(&mut self, vertex_index: u32, slot: usize) -> (&mut States, usize) {
         let (packet, lane) = (vertex_index as usize / LANES, vertex_index as usize % LANES);
+        self.open = true;
         (&mut self.for_light[packet * self.slots + slot], lane)
     }
 
@@ -192,6 +198,7 @@ impl LevelStates {
     pub fn at_for_scatter(&mut self, vertex_index: u32, slot: usize) -> (&mut States, usize) {
         let (packet, lane) = (vertex_index as usize / LANES, vertex_index as usize % LANES);
         let at = packet * self.slots + slot;
+        self.open = true;
         self.differs[at].set(lane, true);
         (&mut self.for_scatter[at], lane)
     }
