@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use super::Allocator;
-use super::allocate::allocate;
+use super::allocate::{Demand, allocate};
 use super::budget::{FIRST_SHARE, FIRST_SPP};
 use crate::error::{Error, Result};
 use crate::film::{BINS, Frame, Layer};
@@ -41,7 +41,10 @@ impl Goals {
         let counts: Vec<u32> = frame.require(Layer::Samples)?.data.iter().map(|&count| count as u32).collect();
         let there: u64 = counts.iter().map(|&count| u64::from(count)).sum();
         let left = (u64::from(spp) * counts.len() as u64).saturating_sub(there);
-        Ok(Self { size: (frame.width, frame.height), counts: raised(&need, counts, left) })
+        // Without the scene nothing is known of costs.
+        let cost = vec![1.0; need.len()];
+        let demand = Demand { width: frame.width, need: &need, cost: &cost, counts: &counts };
+        Ok(Self { size: (frame.width, frame.height), counts: raised(&demand, left) })
     }
 
     /// Reads the counts of a file: goals, or an image or layers of another render.
@@ -98,11 +101,9 @@ pub fn first_round(spp: u32) -> u32 {
     ((FIRST_SHARE * f64::from(spp)) as u32 / BINS as u32 * BINS as u32).max(FIRST_SPP)
 }
 
-/// Counts with `samples` more, allocated by need.
-pub(super) fn raised(need: &[f32], mut counts: Vec<u32>, samples: u64) -> Vec<u32> {
-    let added = allocate(need, &counts, samples);
-    counts.iter_mut().zip(added).for_each(|(count, more)| *count += more);
-    counts
+/// Counts with `samples` more, allocated by need and cost.
+pub(super) fn raised(demand: &Demand, samples: u64) -> Vec<u32> {
+    demand.counts.iter().zip(allocate(demand, samples)).map(|(count, more)| count + more).collect()
 }
 
 #[cfg(test)]

@@ -3,6 +3,7 @@
 use std::sync::{Mutex, MutexGuard};
 use std::time::{Duration, Instant};
 
+use super::allocate::Demand;
 use super::budget::{Budget, FirstPass, NextPass, Spent};
 use super::goals::raised;
 use super::journal::Stage;
@@ -10,7 +11,7 @@ use super::{Allocator, Journal, Limits, Pass, PreviousPass, check, uniform};
 use crate::error::Result;
 use crate::film::Frame;
 use crate::reconstruct::{self, Context, Reconstruction, Solution};
-use crate::render::{Control, RenderOutcome, RenderSettings, render_to_counts};
+use crate::render::{Control, RenderOutcome, RenderSettings, render_to_counts, sample_costs};
 use crate::scene::Scene;
 use crate::sync::lock;
 
@@ -214,7 +215,9 @@ impl Run<'_> {
 
     /// Writes down the sample counts that the pixels are to have.
     fn add_goals(&mut self, need: &[f32], samples: u64) {
-        let goals = raised(need, self.render.film.counts(), samples);
+        let cost = sample_costs(self.scene, self.settings.render, &self.render);
+        let (width, counts) = (self.render.film.width, self.render.film.counts());
+        let goals = raised(&Demand { width, need, cost: &cost, counts: &counts }, samples);
         self.journal().goals = goals;
     }
 

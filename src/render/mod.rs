@@ -10,6 +10,7 @@
 mod camera;
 mod continuation;
 mod control;
+mod costs;
 mod direct;
 mod emission;
 mod features;
@@ -32,6 +33,7 @@ mod wave;
 use serde::{Deserialize, Serialize};
 
 pub use self::control::{Control, FilmSink, SampleSink, WaveSamples};
+pub use self::costs::sample_costs;
 pub use self::gradient::{SHIFTS, Shift};
 pub use self::outcome::RenderOutcome;
 pub use self::sampler::Sampler;
@@ -41,7 +43,7 @@ pub use self::wave::Samples;
 
 /// Number of the samples: raised whenever a change of the program changes any bit of any sample, or a decision of adaptive runs. Films of different epochs are not
 /// of the same samples, so they cannot be resumed or added.
-pub const EPOCH: u32 = 1;
+pub const EPOCH: u32 = 2;
 
 /// One sample of one pixel, the same whenever and wherever it is asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]

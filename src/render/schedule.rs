@@ -284,6 +284,9 @@ fn run_tile(
         }
         numbers.clear();
         numbers.extend((0..spans.len()).filter(|&pixel| spans[pixel].contains(&index)));
+        if numbers.is_empty() {
+            continue;
+        }
         pixels.clear();
         pixels.extend(numbers.iter().map(|&pixel| all[pixel]));
         cells.clear();

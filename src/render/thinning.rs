@@ -12,6 +12,9 @@ const OF: u32 = 3;
 /// Cost of a sample's differences besides the rays of offsets, in path samples (fitted to fourteen scenes).
 const REST: f32 = 0.1;
 
+/// Cost of a sample besides rays, in rays of paths.
+const SAMPLE: f32 = 2.0;
+
 /// Exponents of the number of samples, and of the share of them that comes with differences, that errors of `frgr` fall with
 /// (docs/design/performance.md, "Differences where they pay").
 const BY_SAMPLES: f32 = 0.8;
@@ -26,6 +29,13 @@ pub struct Work {
     pub offsets: f32,
 }
 
+impl Work {
+    /// Cost of a sample, by that of `pixels` of them with differences, in rays of paths.
+    pub fn per_sample(self, pixels: usize) -> f32 {
+        SAMPLE + (self.paths + share(self) as f32 / OF as f32 * self.offsets) / pixels as f32
+    }
+}
+
 /// Samples of every [`OF`] that come with differences: as many as make the error at equal time, samples^-a share^-b, least.
 fn share(work: Work) -> u32 {
     let cost = REST + work.offsets / work.paths.max(1.0);
@@ -36,9 +46,9 @@ fn share(work: Work) -> u32 {
     (1..OF).rev().fold(OF, |best, thirds| if error(thirds) < error(best) { thirds } else { best })
 }
 
-/// The shares of the tiles of a film, found when they are first needed. They depend on scene and seed alone, so that samples stay
-/// the same in whatever order and on whatever machine they are taken.
-pub struct Shares(PerTile<u32>);
+/// The work of the tiles of a film, found when it is first needed, and the shares that follow from it. They depend on scene and seed alone, so
+/// that samples stay the same in whatever order and on whatever machine they are taken.
+pub struct Shares(PerTile<(Work, u32)>);
 
 impl Shares {
     /// Shares of a number of tiles, none of them known.
@@ -48,12 +58,24 @@ impl Shares {
 
     /// Tells the work of a tile's samples of number zero.
     pub fn learn(&self, tile: usize, work: Work) {
-        self.0.get(tile, || share(work));
+        self.0.get(tile, || (work, share(work)));
     }
 
     /// Whether sample `number` of a tile comes with differences; `find` finds the work of samples number zero if it is not known.
     pub fn has_differences(&self, tile: usize, number: u32, find: impl FnOnce() -> Work) -> bool {
-        number < FIRST || number % OF < *self.0.get(tile, || share(find()))
+        number < FIRST || number % OF < self.get(tile, find).1
+    }
+
+    /// Work of a tile's samples of number zero; `find` finds it if it is not known.
+    pub fn work(&self, tile: usize, find: impl FnOnce() -> Work) -> Work {
+        self.get(tile, find).0
+    }
+
+    fn get(&self, tile: usize, find: impl FnOnce() -> Work) -> &(Work, u32) {
+        self.0.get(tile, || {
+            let work = find();
+            (work, share(work))
+        })
     }
 }
 

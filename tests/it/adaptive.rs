@@ -50,7 +50,7 @@ fn budgets_are_met_to_the_sample_by_every_method_and_allocator() {
             let even = outcome.render.film.counts().iter().all(|&count| count == 20);
             assert_eq!(even, allocator.id() == "uniform", "{} {}", method.id, allocator.id());
             // Nobody is left with the first pass's samples.
-            assert!(outcome.render.film.counts().iter().all(|&count| count >= 10));
+            assert!(outcome.render.film.counts().iter().all(|&count| count > 8));
         }
     }
 }

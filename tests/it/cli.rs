@@ -5,6 +5,7 @@ use std::path::Path;
 use assert_cmd::Command;
 use fluxion::film::RECORDED;
 use fluxion::image::io::read_color;
+use fluxion::render::EPOCH;
 
 pub fn fluxion(folder: &Path) -> Command {
     let mut command = Command::cargo_bin("fluxion").unwrap();
@@ -149,8 +150,8 @@ fn a_report_says_everything_but_where_files_are() {
     let (text, error) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
     assert!(output.status.success(), "{error}");
     let warnings = ["warning      odd room.xml:1: the film's `exposure`", "warning      ball.xml:1: a sphere"];
-    for expected in ["epoch 1 of samples", "threads", "Embree", "fingerprint", "gradients"].into_iter().chain(warnings)
-    {
+    let epoch = format!("epoch {EPOCH} of samples");
+    for expected in [epoch.as_str(), "threads", "Embree", "fingerprint", "gradients"].into_iter().chain(warnings) {
         assert!(text.contains(expected), "{expected}: {text}");
     }
     for private in ["John", "Doe", "else where", &*folder.path().to_string_lossy()] {

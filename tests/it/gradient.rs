@@ -196,8 +196,7 @@ fn half_vector_copies_can_be_undone_and_their_jacobian_is_the_change_of_solid_an
         let (back, inverse) = reflect(other_wi, other_wo, wi).unwrap();
         assert!(back.distance(wo) < 1e-4 && (jacobian * inverse - 1.0).abs() < 1e-3);
         if jacobian < 20.0 {
-            let numeric =
-                numeric_jacobian(wo, |wo| reflect(wi, wo, other_wi).map_or(Vec3::ZERO, |(w, _)| w));
+            let numeric = numeric_jacobian(wo, |wo| reflect(wi, wo, other_wi).map_or(Vec3::ZERO, |(w, _)| w));
             assert!((numeric / jacobian - 1.0).abs() < 0.05, "{numeric} {jacobian}");
         }
     }

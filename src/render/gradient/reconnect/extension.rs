@@ -23,7 +23,7 @@ struct Request {
     vertex_index: u32,
 }
 
-/// What base paths leave their vertices for.
+/// Aim that base paths leave their vertices for.
 #[derive(Clone, Copy, PartialEq)]
 enum Purpose {
     /// The sampled emitter points.
@@ -167,7 +167,8 @@ impl Extensions {
             reached.materials.evaluate(scene, &reached.surfaces, hit);
             diffuse = context.diffuse(reached.materials.roughness());
         }
-        let ends = ends(scene, (vertices, lanes, purpose), (&offset.surfaces, &copies), (&rays, &reached.surfaces, hit));
+        let ends =
+            ends(scene, (vertices, lanes, purpose), (&offset.surfaces, &copies), (&rays, &reached.surfaces, hit));
         let of_purpose = if purpose == Purpose::Light { &mut self.for_light } else { &mut self.for_scatter };
         for (from, &Request { slot, lane: to, .. }) in requests.iter().enumerate() {
             let extended = &mut of_purpose[slot];
@@ -185,7 +186,8 @@ impl Extensions {
 /// How some base paths leave their vertices.
 fn departures<'a>(vertices: &'a Vertices, lanes: &'a [usize], purpose: Purpose) -> Departures<'a> {
     let Vertices { surfaces, materials, scatters, light, .. } = vertices;
-    let mut left = Departures { surfaces, materials, lanes, wi: Lanes3::ZERO, wo: Lanes3::ZERO, lobes: [Lobe::Smooth; LANES] };
+    let mut left =
+        Departures { surfaces, materials, lanes, wi: Lanes3::ZERO, wo: Lanes3::ZERO, lobes: [Lobe::Smooth; LANES] };
     for (to, &lane) in lanes.iter().enumerate() {
         left.wi.set(to, surfaces.wi.get(lane));
         match purpose {

@@ -100,7 +100,7 @@ impl ShiftMapping for Reconnect {
     ) {
         self.received.collect(record, self.ambient);
         let PathRecord { levels, packets: counts, .. } = &*record;
-        let base = &levels[0][..counts[0]];
+        let base = counts.first().map_or(&[][..], |&packets| &levels[0][..packets]);
         self.offsets.start((tracer.scene, self.threshold), camera, edges, base);
         self.start(camera.pixels.len(), edges);
         let received = std::mem::take(&mut self.received);

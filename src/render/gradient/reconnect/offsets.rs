@@ -7,8 +7,8 @@ use crate::math::lanes::{Bits, LANES, Lanes, Mask};
 use crate::render::camera::CameraSamples;
 use crate::render::half_edges::HalfEdges;
 use crate::render::vertices::Vertices;
-use crate::scene::packet::{Materials, Rays, Surfaces};
 use crate::scene::Scene;
+use crate::scene::packet::{Materials, Rays, Surfaces};
 
 /// Vertex index of an offset that hits nothing, and of pixels of the window without an index yet.
 pub const MISS: u32 = u32::MAX;

@@ -37,7 +37,7 @@ impl Received {
         self.total().nonzero() | self.ambient.nonzero()
     }
 
-    /// What the next vertices of a packet receive; `below` are those of the next depth. `ambient`: the ambient light, too.
+    /// Light at the next vertices of a packet; `below` are those of the next depth. `ambient`: the ambient light, too.
     #[inline(always)]
     pub fn next(vertices: &Vertices, below: (&[Vertices], &[Self]), ambient: bool) -> Self {
         let mut next = Self::NONE;
