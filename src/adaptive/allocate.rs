@@ -4,7 +4,6 @@ use crate::error::Result;
 use crate::film::{Frame, Layer};
 use crate::image::Image;
 use crate::image::planes::Planes;
-use crate::math::rng;
 
 /// Radius of the squares that needs are averaged over: error estimates of single pixels are noisy, and a pixel's samples
 /// improve those around it, too.
@@ -101,13 +100,12 @@ pub fn allocate(demand: &Demand, samples: u64) -> Vec<u32> {
     round(&blocks, |block| share(low, block), (demand.need.len(), samples))
 }
 
-/// Integers near the shares of blocks, with a given sum: the remainder of a block is carried over to the next, from a random start.
+/// Integers near the shares of blocks, with a given sum: the remainder of a block is carried over to the next.
 fn round(blocks: &[Block], share: impl Fn(&Block) -> f64, (pixels, samples): (usize, u64)) -> Vec<u32> {
     let all: f64 = blocks.iter().map(|block| share(block) * block.pixels.len() as f64).sum();
     let scale = samples as f64 / all.max(1e-300);
     let mut counts = vec![0; pixels];
-    let mut due = (BLOCK * BLOCK) as f64 * f64::from(rng::unit(rng::combine(samples, pixels as u64)));
-    let mut left = samples;
+    let (mut due, mut left) = (0.0, samples);
     for block in blocks {
         let size = block.pixels.len() as u64;
         due += share(block) * scale * size as f64;
@@ -123,6 +121,7 @@ fn round(blocks: &[Block], share: impl Fn(&Block) -> f64, (pixels, samples): (us
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::rng;
 
     fn demand<'a>(width: usize, [need, cost]: [&'a [f32]; 2], counts: &'a [u32]) -> Demand<'a> {
         Demand { width, need, cost, counts }

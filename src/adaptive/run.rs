@@ -93,9 +93,6 @@ struct Times {
     guide: Option<f64>,
 }
 
-/// Share of a method's duration that its guide is taken to need until it has been measured.
-const GUIDE_SHARE: f64 = 0.5;
-
 struct Run<'a> {
     scene: &'a Scene,
     settings: &'a AdaptiveSettings<'a>,
@@ -155,15 +152,17 @@ impl Run<'_> {
         lock(self.journal)
     }
 
-    /// Seconds that the method takes, if they are known.
+    /// Seconds that the method takes, if they are known or can be foreseen by its guide's.
     fn known_duration(&self) -> Option<f64> {
-        self.times.method.or(self.settings.reconstruction.map(|known| known.as_secs_f64()))
+        let known = self.settings.reconstruction.map(|known| known.as_secs_f64());
+        let foreseen = || self.times.guide.map(|guide| guide / self.settings.method.guide_share());
+        self.times.method.or(known).or_else(foreseen)
     }
 
     fn spent(&self) -> Spent {
         let reconstruction = self.known_duration().unwrap_or(0.0);
         let between = match self.settings.method.guide() {
-            Some(_) => self.times.guide.unwrap_or(GUIDE_SHARE * reconstruction),
+            Some(_) => self.times.guide.unwrap_or(self.settings.method.guide_share() * reconstruction),
             None => reconstruction,
         };
         Spent {
@@ -283,10 +282,8 @@ impl Run<'_> {
     /// Reconstructs and estimates the error, if a decision depends on it.
     fn evaluate(&mut self, frame: Frame) -> Result<Evaluation> {
         let notes = self.journal().notes.clone();
-        // A target is one of the method's own image; and to leave time for the last reconstruction it has to be measured once.
-        let Limits { time, error, .. } = self.settings.limits;
-        let itself = error.is_some() || (time.is_some() && self.known_duration().is_none());
-        let guided = self.settings.method.guide().is_some() && !itself;
+        // A target is one of the method's own image.
+        let guided = self.settings.method.guide().is_some() && self.settings.limits.error.is_none();
         let decides = self.budget.by_error && notes.left > 0;
         let solution = if decides { Some(self.solve(&frame, guided)?) } else { None };
         let error = solution.as_ref().map(|solution| notes.estimate.rel_mse(&frame, solution));

@@ -59,6 +59,19 @@ impl Vectors {
     }
 }
 
+/// Has an element of a slice, if there is such, brought into the cache while other things are done.
+#[inline(always)]
+pub fn prefetch<T>(slice: &[T], index: usize) {
+    #[cfg(target_arch = "x86_64")]
+    if let Some(element) = slice.get(index) {
+        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        // SAFETY: every processor of the architecture has the instruction, which has no effect but on the cache.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(std::ptr::from_ref(element).cast()) }
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = (slice, index);
+}
+
 /// Compiles a function once for each of [`Vectors`]; calls run the widest ones. Arguments are names, or tuples and arrays
 /// of names.
 macro_rules! vectorized {

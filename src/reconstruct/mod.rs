@@ -103,6 +103,11 @@ pub trait Reconstruction: Send + Sync {
         None
     }
 
+    /// Duration of the guide over that of the method, by which the latter is foreseen.
+    fn guide_share(&self) -> f64 {
+        1.0
+    }
+
     /// Warnings about what a frame lacks that the method does without.
     fn warnings(&self, _frame: &Frame) -> Vec<String> {
         Vec::new()

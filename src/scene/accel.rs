@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::packet::Rays;
+use super::packet::{Rays, ShapeInfo};
 use super::ray_log::RayLog;
 use super::shape::{Bounds, Geometry};
 use super::{Group, Ray, Shape, Surface};
@@ -23,6 +23,9 @@ pub struct Accel {
     version: (u32, u32, u32),
     log: Option<RayLog>,
 }
+
+/// All shapes of a scene with their properties.
+type Shapes<'a> = (&'a [Shape], &'a [ShapeInfo]);
 
 /// A group of shapes somewhere in the world.
 struct Placement {
@@ -111,7 +114,7 @@ impl Accel {
 
     /// The surface of a hit, of one of all shapes.
     #[inline]
-    pub fn surface(&self, shapes: &[Shape], hit: &Hit, ray: Ray) -> Surface {
+    pub fn surface(&self, shapes: Shapes, hit: &Hit, ray: Ray) -> Surface {
         let Some(instance) = hit.instance() else { return shape_surface(shapes, hit.geometry, hit, ray) };
         let placement = &self.placements[(instance - self.first_placement) as usize];
         Surface { instance: instance - self.first_placement, ..placement.surface(shapes, hit, ray) }
@@ -171,9 +174,10 @@ fn attach(builder: &mut SceneBuilder, shapes: &[Shape]) -> Result<Bounds> {
 }
 
 #[inline]
-fn shape_surface(shapes: &[Shape], number: u32, hit: &Hit, ray: Ray) -> Surface {
+fn shape_surface((shapes, infos): Shapes, number: u32, hit: &Hit, ray: Ray) -> Surface {
     let shape = &shapes[number as usize];
-    let mut surface = shape.geometry.surface(hit, ray, shape.bsdf.needs_derivatives());
+    let wanted = (shape.bsdf.needs_derivatives(), infos[number as usize].uv);
+    let mut surface = shape.geometry.surface(hit, ray, wanted);
     surface.at.shape = number;
     surface
 }
@@ -188,7 +192,7 @@ impl Placement {
     /// The hit is found in the group's own coordinates, along an unnormalised ray so that distances stay the same. Kept
     /// apart from the common case, which is inlined.
     #[inline(never)]
-    fn surface(&self, shapes: &[Shape], hit: &Hit, ray: Ray) -> Surface {
+    fn surface(&self, shapes: Shapes, hit: &Hit, ray: Ray) -> Surface {
         let inside = Ray {
             origin: self.to_group.transform_point3(ray.origin),
             direction: self.to_group.transform_vector3(ray.direction),

@@ -213,7 +213,7 @@ impl Scene {
     /// The first surface along a ray.
     pub fn intersect(&self, ray: Ray) -> Option<Surface> {
         let hit = self.accel.intersect(ray)?;
-        let mut surface = self.accel.surface(&self.shapes, &hit, ray);
+        let mut surface = self.accel.surface((&self.shapes, &self.shape_infos), &hit, ray);
         surface.epsilon = self.epsilon(surface.p);
         Some(surface)
     }

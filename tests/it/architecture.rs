@@ -29,6 +29,7 @@ const FFI_USERS: &[&str] = &[
     "src/scene/ray_log.rs",
     "src/scene/packet/rays.rs",
     "src/scene/packet/surfaces.rs",
+    "src/scene/texture/texels.rs",
     "src/scene/shape/mod.rs",
     "src/scene/shape/mesh.rs",
     "src/scene/shape/sphere.rs",

@@ -304,7 +304,7 @@ fn points_drawn_on_shapes_are_on_them() {
         for i in 0..64 {
             let u = vec2((i % 8) as f32 + 0.5, (i / 8) as f32 + 0.5) / 8.0;
             let from = vec3(0.3, -0.2, 5.0);
-            let point = geometry.sample(from, u).unwrap();
+            let point = geometry.sample(from, u, true).unwrap();
             let Position::Surface { p, n } = point.position else { panic!("{plugin} has no surface") };
             let hit = scene.intersect(Ray::new(p + n * 0.1, -n)).unwrap();
             assert!(hit.p.distance(p) < 1e-4 && hit.n.distance(n) < 1e-4, "{plugin}: {hit:?} {point:?}");

@@ -120,6 +120,10 @@ impl Reconstruction for Blend {
         self.net.guide()
     }
 
+    fn guide_share(&self) -> f64 {
+        0.3
+    }
+
     fn reconstruct(&self, frame: &Frame, context: &Context) -> Result<Solution> {
         check_memory(frame, context, METHOD.id, BYTES)?;
         let inputs = Inputs::new(frame, 1)?;

@@ -135,6 +135,10 @@ impl Reconstruction for Auto {
         self.net.guide().filter(|_| !self.filtered)
     }
 
+    fn guide_share(&self) -> f64 {
+        self.net.guide_share()
+    }
+
     fn reconstruct(&self, frame: &Frame, context: &Context) -> Result<Solution> {
         let share = (FILTERED_SAMPLES / Inputs::new(frame, 1)?.spp).powi(2).min(1.0);
         if share < LEAST_SHARE && !self.filtered {
@@ -170,6 +174,10 @@ impl Reconstruction for Net {
 
     fn guide(&self) -> Option<&dyn Reconstruction> {
         Some(&self.frgr)
+    }
+
+    fn guide_share(&self) -> f64 {
+        0.45
     }
 
     fn reconstruct(&self, frame: &Frame, context: &Context) -> Result<Solution> {

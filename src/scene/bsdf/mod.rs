@@ -68,6 +68,11 @@ pub trait Bsdf: Send + Sync {
         Vec::new()
     }
 
+    /// Has everything that the closure looks up at a point brought into the cache.
+    fn prefetch(&self, at: &Point) {
+        self.textures().into_iter().for_each(|texture| texture.prefetch(at));
+    }
+
     /// Draws a direction from the lobe number `lobe` in [0, 1) and `u`. `None` absorbs.
     fn sample(&self, surface: &Surface, wi: Vec3, lobe: f32, u: Vec2) -> Option<BsdfSample> {
         self.closure(&surface.at, &|| *surface)?.sample_one(wi, lobe, u)

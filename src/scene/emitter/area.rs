@@ -13,18 +13,21 @@ pub struct Area {
     geometry: Arc<Geometry>,
     radiance: Arc<dyn Texture>,
     shape: u32,
+    /// Whether the radiance varies over the shape.
+    textured: bool,
 }
 
 impl Area {
     /// An emissive shape and its index.
     pub fn new(geometry: Arc<Geometry>, radiance: Arc<dyn Texture>, shape: u32) -> Self {
-        Self { geometry, radiance, shape }
+        let textured = radiance.constant().is_none();
+        Self { geometry, radiance, shape, textured }
     }
 }
 
 impl Emitter for Area {
     fn sample(&self, from: Vec3, u: Vec2) -> Option<LightPoint> {
-        let mut point = self.geometry.sample(from, u)?;
+        let mut point = self.geometry.sample(from, u, self.textured)?;
         point.at.shape = self.shape;
         Some(point)
     }

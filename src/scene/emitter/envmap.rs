@@ -89,6 +89,7 @@ impl EnvMap {
     pub fn hits(&self, directions: Lanes3, active: Mask) -> EnvmapHits {
         let uv = self.uv(directions);
         let (mut pdf, mut radiance) = (Lanes::ZERO, Lanes3::ZERO);
+        active.lanes().for_each(|lane| self.prefetch(vec2(uv[0].0[lane], uv[1].0[lane])));
         for lane in active.lanes() {
             let at = vec2(uv[0].0[lane], uv[1].0[lane]);
             pdf.0[lane] = self.partition.as_ref().map_or(0.0, |partition| partition.pdf(at));
@@ -107,6 +108,7 @@ impl EnvMap {
         for lane in active.lanes() {
             let (uv, pdf) = points[lane];
             (x.0[lane], y.0[lane], cell_pdf.0[lane]) = (uv.x, uv.y, pdf);
+            self.prefetch(uv);
         }
         active.lanes().for_each(|lane| sample.radiance.set(lane, self.look_up(vec2(x.0[lane], y.0[lane]))));
         let (cos_phi, sin_phi) = x.cos_sin_turns();
@@ -147,6 +149,14 @@ impl EnvMap {
         let u = turns.less(Lanes::ZERO).select(turns + Lanes::ONE, turns);
         let v = Lanes::atan2((d.x * d.x + d.z * d.z).sqrt(), d.y) * Lanes::splat(FRAC_1_PI);
         [u.min(Lanes::splat(ALMOST_ONE)), v]
+    }
+
+    /// Has the texels around a point brought into the cache.
+    #[inline]
+    fn prefetch(&self, uv: Vec2) {
+        let (width, height) = (self.texels.width, self.texels.height);
+        let y = ((uv.y * (height - 1) as f32) as usize).min(height - 2);
+        self.texels.prefetch(((uv.x * width as f32 - 0.5) as usize).min(width - 1), [y, y + 1]);
     }
 
     /// Columns have their centres at half numbers and wrap around; the first and last row are the poles.

@@ -24,6 +24,8 @@ pub struct ShapeInfo {
     pub mesh: bool,
     /// Whether texture coordinates are used.
     pub uv: bool,
+    /// Whether the material looks images up.
+    pub images: bool,
 }
 
 impl ShapeInfo {
@@ -39,12 +41,15 @@ impl ShapeInfo {
         let mesh = matches!(&**geometry, Geometry::Mesh(_)) && !bsdf.needs_derivatives();
         let surface = Surface::default();
         let closure = bsdf.closure(&surface.at, &|| surface);
-        let constant = bsdf.textures().iter().all(|texture| texture.constant().is_some());
+        let textures = bsdf.textures();
+        let constant = textures.iter().all(|texture| texture.constant().is_some());
+        let images = textures.iter().any(|texture| texture.resolution().is_some());
         let closes = closure.is_some();
         let kind = closure.map_or(Kind::None as usize, |closure| closure.kind());
         let diffuse = closure.is_some_and(|closure| closure.plainly_diffuse().any()) && !bsdf.transmits();
         let closure = closure.filter(|_| constant);
-        Self { emitter: *emitter, closes, kind, diffuse, mesh, uv: closure.is_none() || emitter.is_some(), closure }
+        let uv = closure.is_none() || emitter.is_some();
+        Self { emitter: *emitter, closes, kind, diffuse, mesh, uv, images, closure }
     }
 }
 

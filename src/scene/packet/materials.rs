@@ -16,6 +16,13 @@ impl Materials {
     /// Evaluates the materials of the active surfaces.
     pub fn evaluate(&mut self, scene: &Scene, surfaces: &Surfaces, active: Mask) {
         self.closures.roughness = Lanes::splat(f32::INFINITY);
+        // Images are waited for together, not one after the other.
+        for lane in active.lanes() {
+            let number = surfaces.shape.0[lane] as usize;
+            if scene.shape_infos[number].images {
+                scene.shapes[number].bsdf.prefetch(&surfaces.at(lane));
+            }
+        }
         for lane in active.lanes() {
             let number = surfaces.shape.0[lane] as usize;
             let info = &scene.shape_infos[number];

@@ -276,7 +276,7 @@ impl Scene {
         let left = meshes((&self.shapes, &self.shape_infos), self.accel.size(), rays, hits, found, surfaces);
         for lane in left.lanes() {
             let Some(hit) = hits.get(lane) else { continue };
-            let mut one = self.accel.surface(&self.shapes, &hit, rays.get(lane));
+            let mut one = self.accel.surface((&self.shapes, &self.shape_infos), &hit, rays.get(lane));
             one.epsilon = self.epsilon(one.p);
             surfaces.set(lane, &one);
             surfaces.emissive.set(lane, self.shape_infos[one.at.shape as usize].emitter.is_some());

@@ -102,12 +102,13 @@ pub enum Geometry {
 }
 
 impl Geometry {
-    /// The surface at the point that a ray has hit. `derivatives`: whether dp_du and dp_dv are wanted.
+    /// The surface at the point that a ray has hit. `derivatives`: whether dp_du and dp_dv are wanted; `uv`: whether texture
+    /// coordinates are, where they cost much.
     #[inline]
-    pub fn surface(&self, hit: &Hit, ray: Ray, derivatives: bool) -> Surface {
+    pub fn surface(&self, hit: &Hit, ray: Ray, (derivatives, uv): (bool, bool)) -> Surface {
         match self {
             Self::Mesh(mesh) => mesh.surface(hit, ray, derivatives),
-            Self::Sphere(sphere) => sphere.surface(hit, ray, derivatives),
+            Self::Sphere(sphere) => sphere.surface(hit, ray, (derivatives, uv)),
             Self::Disk(disk) => disk.surface(hit, ray),
             Self::Cylinder(cylinder) => cylinder.surface(hit, ray),
             Self::Curves(curves) => curves.surface(hit, ray, derivatives),
@@ -145,10 +146,10 @@ impl Geometry {
     }
 
     /// A point to light `from` with, but for curves, which do not emit; the emitter's number is left to the caller.
-    pub fn sample(&self, from: Vec3, u: Vec2) -> Option<LightPoint> {
+    pub fn sample(&self, from: Vec3, u: Vec2, uv: bool) -> Option<LightPoint> {
         match self {
             Self::Mesh(mesh) => mesh.sample(u),
-            Self::Sphere(sphere) => sphere.sample(from, u),
+            Self::Sphere(sphere) => sphere.sample(from, u, uv),
             Self::Disk(disk) => Some(disk.sample(u)),
             Self::Cylinder(cylinder) => Some(cylinder.sample(u)),
             Self::Curves(_) => None,

@@ -57,6 +57,13 @@ pub struct Sphere {
 }
 
 impl Sphere {
+    /// Texture coordinates, if they are wanted: their angles cost as much as the rest of the surface.
+    #[inline]
+    fn at(&self, outward: Vec3, uv: bool) -> texture::Point {
+        let uv = if uv { self.uv(outward) } else { Vec2::ZERO };
+        texture::Point { uv, ..texture::Point::default() }
+    }
+
     fn uv(&self, outward: Vec3) -> Vec2 {
         let local = self.to_object.transform_vector3(outward).normalize_or(Vec3::Z);
         let phi = local.y.atan2(local.x);
@@ -64,7 +71,7 @@ impl Sphere {
     }
 
     /// The surface at the point that a ray has hit.
-    pub fn surface(&self, hit: &Hit, ray: Ray, derivatives: bool) -> Surface {
+    pub fn surface(&self, hit: &Hit, ray: Ray, (derivatives, uv): (bool, bool)) -> Surface {
         // The hit pulled onto the sphere: its distance is less exact than its direction from the centre.
         let outward = (ray.origin + ray.direction * hit.t - self.center).normalize_or(-ray.direction);
         let n = outward * self.side;
@@ -74,7 +81,7 @@ impl Sphere {
             p: self.center + outward * self.radius,
             n,
             frame,
-            at: texture::Point { uv: self.uv(outward), ..texture::Point::default() },
+            at: self.at(outward, uv),
             dp_du,
             dp_dv,
             instance: u32::MAX,
@@ -113,15 +120,15 @@ impl Sphere {
         (sin2 < 0.9999).then(|| sin2 / (1.0 + (1.0 - sin2).sqrt()))
     }
 
-    fn point(&self, outward: Vec3) -> LightPoint {
+    fn point(&self, outward: Vec3, uv: bool) -> LightPoint {
         let position = Position::Surface { p: self.center + outward * self.radius, n: outward * self.side };
-        LightPoint::drawn(position, texture::Point { uv: self.uv(outward), ..texture::Point::default() })
+        LightPoint::drawn(position, self.at(outward, uv))
     }
 
-    /// A point uniform over the cone that `from` sees, or over the area from inside.
-    pub fn sample(&self, from: Vec3, u: Vec2) -> Option<LightPoint> {
+    /// A point uniform over the cone that `from` sees, or over the area from inside; with its texture coordinates if they are wanted.
+    pub fn sample(&self, from: Vec3, u: Vec2, uv: bool) -> Option<LightPoint> {
         let Some(versine) = self.versine(from) else {
-            return Some(self.point(warp::sphere(u)));
+            return Some(self.point(warp::sphere(u), uv));
         };
         let axis = self.center - from;
         let distance = axis.length();
@@ -130,7 +137,7 @@ impl Sphere {
         let half_chord2 = self.radius * self.radius - distance * distance * (1.0 - local.z * local.z);
         let along = distance * local.z - half_chord2.max(0.0).sqrt();
         let p = from + Frame::around(axis / distance).to_world(local) * along;
-        Some(self.point((p - self.center).try_normalize()?))
+        Some(self.point((p - self.center).try_normalize()?, uv))
     }
 
     /// Density of [`Sphere::sample`] per solid angle at `from`.

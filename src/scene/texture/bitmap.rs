@@ -168,6 +168,14 @@ impl Texture for Bitmap {
         a.lerp(b, f.x).lerp(c.lerp(d, f.x), f.y)
     }
 
+    fn prefetch(&self, point: &Point) {
+        let corner = (self.to_uv.apply(point.uv) * self.size() - 0.5).floor();
+        let (width, height) = (self.texels.width, self.texels.height);
+        let (x, y) = (corner.x as i64, corner.y as i64);
+        let rows = [y, y.saturating_add(1)].map(|y| self.wrap[1].apply(y, height));
+        self.texels.prefetch(self.wrap[0].apply(x, width), rows);
+    }
+
     fn gradient(&self, point: &Point) -> Vec2 {
         if self.nearest {
             return Vec2::ZERO;

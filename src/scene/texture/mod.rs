@@ -38,6 +38,9 @@ pub trait Texture: Send + Sync {
         luminance(self.color(at))
     }
 
+    /// Has whatever a look-up at a point needs brought into the cache.
+    fn prefetch(&self, _at: &Point) {}
+
     /// Change of [`Texture::scalar`] per u and per v.
     fn gradient(&self, _at: &Point) -> Vec2 {
         Vec2::ZERO

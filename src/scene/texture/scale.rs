@@ -40,6 +40,10 @@ impl Texture for Scaled {
         self.nested.scalar(at) * self.grey()
     }
 
+    fn prefetch(&self, at: &Point) {
+        self.nested.prefetch(at);
+    }
+
     fn gradient(&self, at: &Point) -> Vec2 {
         self.nested.gradient(at) * self.grey()
     }

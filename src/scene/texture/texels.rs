@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, OnceLock};
 
 use crate::error::Result;
+use crate::ffi::vectors::prefetch;
 use crate::image::channels::{ColorChannels, Decoding, Integers};
 use crate::image::io::{CachedTexture, DataWindow, ImageFile, OpenImage, TextureSystem};
 use crate::math::{Rgb, half, srgb_decode, vec3};
@@ -133,6 +134,20 @@ impl Texels {
 }
 
 impl Texels {
+    /// Has the texels of two rows in a column brought into the cache, to be looked up soon.
+    #[inline]
+    pub fn prefetch(&self, column: usize, rows: [usize; 2]) {
+        for row in rows {
+            let index = row * self.width + column;
+            match &self.samples {
+                Samples::Float(texels) => prefetch(texels, index),
+                Samples::Half(texels) => prefetch(texels, index),
+                Samples::Byte(texels, _) => prefetch(texels, index),
+                Samples::Cached { .. } => {}
+            }
+        }
+    }
+
     /// Linear colours of the texels in two columns of two rows.
     #[inline]
     pub fn square(&self, [left, right]: [usize; 2], [above, below]: [usize; 2]) -> [Rgb; 4] {

@@ -82,7 +82,7 @@ impl Extensions {
     }
 
     /// Extends the offsets that do not connect to emitter points sampled at their base paths' vertices.
-    pub fn to_lights<'s>(
+    pub fn extend_to_lights<'s>(
         &mut self,
         (context, vertices, active): (&ShiftContext, &Vertices, Mask),
         states: impl Iterator<Item = &'s States>,
@@ -100,7 +100,7 @@ impl Extensions {
     }
 
     /// Extends the offsets that do not connect to their base paths' next vertices, or not for everything there.
-    pub fn to_vertices<'s>(
+    pub fn extend_to_vertices<'s>(
         &mut self,
         (context, vertices, active): (&ShiftContext, &Vertices, Mask),
         next: &NextVertices,

@@ -2,9 +2,11 @@
 //! of gradient-domain path tracing, for all paths of a wave together.
 //!
 //! ```text
-//! base paths by depth ─┐
-//! camera hits ─ offsets ┴─ segment ─┬─ direct, emission: differences
-//!                          states ──┴─ continuation: states at the next depth
+//! base paths by depth -+- received: light at and behind every vertex
+//! camera hits - offsets - extension: half-vector copies of all offsets of a packet
+//!                 |
+//!              segment -+- direct, emission: differences of single emitters
+//!              states --+- continuation: states at the next depth; where an offset joins its base path, all the rest at once
 //! ```
 
 pub mod connection;
@@ -44,8 +46,7 @@ pub const SHIFT: ShiftKind = ShiftKind {
     make: |threshold, ambient| Box::new(Reconnect { threshold, ambient, ..Reconnect::default() }),
 };
 
-/// Costs of connecting and of extending an offset, in rays of paths (fitted to fourteen scenes): connections are made in packets,
-/// extensions one by one.
+/// Costs of connecting and of extending an offset, in rays of paths (fitted to fourteen scenes).
 const CONNECTION: f32 = 0.4;
 const EXTENSION: f32 = 1.8;
 
@@ -168,8 +169,8 @@ impl Reconnect {
         let Some(unconnected) = self.states.unconnected_of_open(packet, slots) else { return };
         let next = NextVertices::new(context, vertices, active & unconnected);
         let at = (context, vertices, active);
-        self.extensions.to_lights(at, self.states.for_light(packet, slots), &mut self.offsets);
-        self.extensions.to_vertices(at, &next, self.states.for_scatter(packet, slots), &mut self.offsets);
+        self.extensions.extend_to_lights(at, self.states.for_light(packet, slots), &mut self.offsets);
+        self.extensions.extend_to_vertices(at, &next, self.states.for_scatter(packet, slots), &mut self.offsets);
         for slot in 0..slots {
             let states = self.states.get(packet, slot);
             let open = active & (states.0.open() | states.1.open());
