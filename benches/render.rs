@@ -88,7 +88,7 @@ fn measure(path: &Path, pools: &[rayon::ThreadPool; 2]) -> Figures {
     let mut rays = 0;
     let replays = (0..ROUNDS).map(|_| {
         let start = Instant::now();
-        (rays, _) = logged.replay_rays();
+        (rays, _) = logged.replay_rays(None);
         start.elapsed().as_secs_f64()
     });
     let replayed = median(replays.collect());

@@ -9,8 +9,8 @@ use fluxion::internals::math::lanes::{LANES, Lanes, Lanes3, Mask};
 use fluxion::mitsuba;
 use fluxion::render::{SHIFTS, Shift};
 use fluxion::render::{SampleId, sample};
-use fluxion::scene::Scene;
 use fluxion::scene::packet::{Rays, Surfaces};
+use fluxion::scene::{Purpose, Scene};
 
 const SCENES: [&str; 3] = ["cornell-box", "glossy-metal", "door-ajar"];
 
@@ -33,7 +33,7 @@ fn camera(scene: &Scene) -> Rays {
 /// Rays that leave what the camera sees in sixteen directions.
 fn bounced(scene: &Scene) -> (Surfaces, Mask, Rays) {
     let mut surfaces = Surfaces::default();
-    let met = scene.intersect_packet(&camera(scene), Mask::first(LANES), true, &mut surfaces);
+    let met = scene.intersect_packet(&camera(scene), Mask::first(LANES), Purpose::Camera, &mut surfaces);
     let around = |lane: usize| (lane as f32 * 2.4).sin_cos();
     let wo = Lanes3 {
         x: Lanes(std::array::from_fn(|lane| 0.8 * around(lane).0)),
@@ -51,7 +51,7 @@ fn camera_packet(bencher: Bencher, name: &str) {
     let (rays, mut surfaces) = (camera(&scene), Surfaces::default());
     bencher
         .counter(ItemsCount::new(LANES))
-        .bench_local(|| scene.intersect_packet(&rays, Mask::first(LANES), true, &mut surfaces));
+        .bench_local(|| scene.intersect_packet(&rays, Mask::first(LANES), Purpose::Camera, &mut surfaces));
 }
 
 #[divan::bench(args = SCENES)]
@@ -61,7 +61,7 @@ fn bounce_packet(bencher: Bencher, name: &str) {
     let mut surfaces = Surfaces::default();
     bencher
         .counter(ItemsCount::new(met.lanes().count()))
-        .bench_local(|| scene.intersect_packet(&rays, met, false, &mut surfaces));
+        .bench_local(|| scene.intersect_packet(&rays, met, Purpose::Path, &mut surfaces));
 }
 
 #[divan::bench(args = SCENES)]
@@ -69,7 +69,7 @@ fn visibility_packet(bencher: Bencher, name: &str) {
     let scene = bundled(name);
     let (from, met, rays) = bounced(&scene);
     let mut to = Surfaces::default();
-    let both = scene.intersect_packet(&rays, met, false, &mut to);
+    let both = scene.intersect_packet(&rays, met, Purpose::Path, &mut to);
     bencher
         .counter(ItemsCount::new(both.lanes().count()))
         .bench_local(|| scene.mutually_visible_packet(&from, &to, both));

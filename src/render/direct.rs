@@ -3,7 +3,7 @@
 use super::Sampler;
 use super::vertices::Vertices;
 use crate::math::lanes::{Bits, Lanes, Lanes3};
-use crate::scene::Scene;
+use crate::scene::{Purpose, Scene};
 
 /// Samples an emitter point for every vertex and keeps the visible ones. Returns MIS-weighted contributions to the
 /// samples' colours, zero where a vertex receives no light.
@@ -20,7 +20,7 @@ pub fn sample_emitters(scene: &Scene, sampler: &Sampler, depth: u32, hash: Bits,
     let radiance = scene.light_radiance(&light.points, direction, found & evals.value.nonzero());
     let lit = found & evals.value.scale(radiance).nonzero();
     (light.radiance, light.wo, light.evals, light.pdf) = (radiance, wo, evals, pdf);
-    vertices.lit = if lit.any() { scene.visible_packet(surfaces, &light.points, lit) } else { lit };
+    vertices.lit = if lit.any() { scene.visible_packet(surfaces, &light.points, lit, Purpose::Light) } else { lit };
     // Power heuristic with exponent two, over the density.
     let ratio = evals.pdf / pdf;
     let weight = Lanes::splat(1.0) / (pdf * (Lanes::splat(1.0) + ratio * ratio));

@@ -6,7 +6,7 @@ use super::record::PathRecord;
 use crate::math::lanes::{Bits, LANES, Lanes, Mask};
 use crate::math::{Rgb, luminance};
 use crate::scene::packet::Surfaces;
-use crate::scene::{Integrator, Scene};
+use crate::scene::{Integrator, Purpose, Scene};
 
 /// Cost of a camera ray, in path samples.
 const COST: f32 = 0.05;
@@ -102,7 +102,7 @@ fn look(
         }
         let rays = camera.rays_through(scene, at, hashes);
         let active = Mask::first(packet.len());
-        let mut hit = scene.intersect_packet(&rays, active, true, surfaces);
+        let mut hit = scene.intersect_packet(&rays, active, Purpose::Camera, surfaces);
         if scene.integrator().pass_emitters {
             scene.pass_emitters(&rays, &mut hit, surfaces);
         }

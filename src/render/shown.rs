@@ -8,7 +8,7 @@ use crate::math::lanes::{LANES, Mask};
 use crate::math::rng;
 use crate::scene::bsdf::Lobe;
 use crate::scene::packet::Surfaces;
-use crate::scene::{Ray, Scene, Surface};
+use crate::scene::{Purpose, Ray, Scene, Surface};
 
 /// A shape, by its number, and the instance that it is in, `u32::MAX` if it is in none.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,7 +40,7 @@ pub fn shown_shapes(scene: &Scene, seed: u64, spp: u32) -> Vec<ShownShapes> {
                 let hashes = camera.hashes(first);
                 let rays = camera.rays(scene, first, hashes, &[]);
                 let active = Mask::first(pixels.len() - first);
-                let mut hit = scene.intersect_packet(&rays, active, true, &mut surfaces);
+                let mut hit = scene.intersect_packet(&rays, active, Purpose::Camera, &mut surfaces);
                 if scene.integrator().pass_emitters {
                     scene.pass_emitters(&rays, &mut hit, &mut surfaces);
                 }

@@ -11,7 +11,7 @@ use crate::math::Rgb;
 use crate::math::lanes::{LANES, Lanes, Lanes3, Mask};
 use crate::scene::closure::KINDS;
 use crate::scene::packet::Hits;
-use crate::scene::{Integrator, Scene};
+use crate::scene::{Integrator, Purpose, Scene};
 
 /// Traces waves of paths; keeps its memory between them.
 pub struct PathTracer<'a> {
@@ -84,7 +84,8 @@ impl<'a> PathTracer<'a> {
         level.resize_with(level.len().max(paths.len().div_ceil(LANES)), Vertices::default);
         next.clear();
         order.hits.clear();
-        let hits = paths.packets().map(|(packet, active)| scene.hits_of_packet(&packet.rays, active, depth == 0));
+        let purpose = if depth == 0 { Purpose::Camera } else { Purpose::Path };
+        let hits = paths.packets().map(|(packet, active)| scene.hits_of_packet(&packet.rays, active, purpose));
         order.hits.extend(hits);
         let sorted = depth > 0 && order.sort(paths.len(), KINDS, |hits, lane| scene.kind_of_hit(hits, lane));
         let mut gathered = (Packet::EMPTY, order.hits[0]);

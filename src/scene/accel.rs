@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::packet::{Rays, ShapeInfo};
-use super::ray_log::RayLog;
+use super::ray_log::{Purpose, RayLog, Tally};
 use super::shape::{Bounds, Geometry};
 use super::{Group, Ray, Shape, Surface};
 use crate::error::Result;
@@ -83,22 +83,22 @@ impl Accel {
         self.scene.intersect(&ray)
     }
 
-    /// The first hits along the active rays. `coherent`: they start and run close together.
+    /// The first hits along the active rays.
     #[inline]
-    pub fn intersect_packet(&self, rays: &Rays, active: Mask, coherent: bool) -> Hits {
+    pub fn intersect_packet(&self, rays: &Rays, active: Mask, purpose: Purpose) -> Hits {
         let rays = rays.to_embree(active);
         if let Some(log) = &self.log {
-            log.first_of_packet(rays, coherent);
+            log.packet(rays, purpose);
         }
-        self.scene.intersect_packet(&rays, coherent)
+        self.scene.intersect_packet(&rays, purpose.is_coherent())
     }
 
     /// Active lanes whose ray hits anything.
     #[inline]
-    pub fn occluded_packet(&self, rays: &Rays, active: Mask) -> Mask {
+    pub fn occluded_packet(&self, rays: &Rays, active: Mask, purpose: Purpose) -> Mask {
         let rays = rays.to_embree(active);
         if let Some(log) = &self.log {
-            log.any_of_packet(rays);
+            log.packet(rays, purpose);
         }
         Mask(self.scene.occluded_packet(&rays))
     }
@@ -136,9 +136,14 @@ impl Accel {
         self.log = Some(RayLog::default());
     }
 
-    /// Traces all logged rays again; returns their number and the number of hits.
-    pub fn replay_rays(&self) -> (usize, usize) {
-        self.log.as_ref().map_or((0, 0), |log| log.replay(&self.scene))
+    /// Traces all logged rays again, or those of one purpose; returns their number and the number of hits.
+    pub fn replay_rays(&self, purpose: Option<Purpose>) -> (usize, usize) {
+        self.log.as_ref().map_or((0, 0), |log| log.replay(&self.scene, purpose))
+    }
+
+    /// Numbers of the logged rays.
+    pub fn logged_rays(&self) -> Vec<Tally> {
+        self.log.as_ref().map_or_else(Vec::new, RayLog::tallies)
     }
 
     /// Diameter of the sphere around everything.

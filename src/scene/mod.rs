@@ -26,6 +26,7 @@ use self::bsdf::Bsdf;
 use self::emitter::{Choice, Emitter, LightPoint};
 pub use self::light_groups::LightGroups;
 use self::packet::{EmitterInfo, ShapeInfo};
+pub use self::ray_log::{Purpose, Tally};
 use self::sensor::{Sensor, SensorInfo};
 pub use self::shape::Bounds;
 use self::shape::Geometry;
@@ -359,9 +360,15 @@ impl Scene {
         &self.files
     }
 
-    /// Traces all rays again that [`BuildOptions::log_rays`] has kept, and does nothing else; returns their number and the number of hits.
-    pub fn replay_rays(&self) -> (usize, usize) {
-        self.accel.replay_rays()
+    /// Traces all rays again that [`BuildOptions::log_rays`] has kept, or those of packets of one purpose, and does nothing else; returns their
+    /// number and the number of hits.
+    pub fn replay_rays(&self, purpose: Option<Purpose>) -> (usize, usize) {
+        self.accel.replay_rays(purpose)
+    }
+
+    /// Numbers of the rays that [`BuildOptions::log_rays`] has kept, of a render on one thread.
+    pub fn logged_rays(&self) -> Vec<Tally> {
+        self.accel.logged_rays()
     }
 
     /// Embree's version, for `info`.

@@ -1,4 +1,4 @@
-//! Every ray query of a render, to be traced again on its own: the time that rendering cannot be
+//! Every ray query of a render, to be counted, and to be traced again on its own: the time that rendering cannot be
 //! faster than.
 
 use std::sync::Mutex;
@@ -6,12 +6,50 @@ use std::sync::Mutex;
 use crate::ffi::embree::{Committed, Ray, Rays};
 use crate::sync::lock;
 
+/// Aim of the rays of a packet.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Purpose {
+    /// Surfaces that the camera sees.
+    Camera,
+    /// Next vertices of paths.
+    Path,
+    /// Emitter points that paths have sampled.
+    Light,
+    /// Surfaces that the camera sees in the pixels that paths are shifted to.
+    OffsetCamera,
+    /// Emitter points that offsets are connected to.
+    OffsetLight,
+    /// Vertices of base paths that offsets are connected to.
+    Connection,
+    /// Next vertices of offsets that are not connected.
+    Extension,
+}
+
+impl Purpose {
+    /// Whether such rays start and run close together.
+    pub fn is_coherent(self) -> bool {
+        matches!(self, Self::Camera | Self::OffsetCamera)
+    }
+}
+
+/// Rays of one purpose at one depth.
+#[derive(Clone, Copy, Debug)]
+pub struct Tally {
+    /// Aim of the rays.
+    pub purpose: Purpose,
+    /// Vertex that they leave, for those of paths; the camera is number 0.
+    pub depth: u32,
+    /// Number of packets.
+    pub packets: u64,
+    /// Number of active rays in them.
+    pub rays: u64,
+}
+
 /// A logged query.
 enum Call {
     First(Ray),
     Any(Ray),
-    FirstOfPacket(Rays, bool),
-    AnyOfPacket(Rays),
+    Packet(Rays, Purpose),
 }
 
 /// The calls in their order.
@@ -33,39 +71,63 @@ impl RayLog {
         self.add(Call::Any(ray));
     }
 
-    /// First hits of a packet.
-    pub fn first_of_packet(&self, rays: Rays, coherent: bool) {
-        self.add(Call::FirstOfPacket(rays, coherent));
+    /// First or any hits of a packet.
+    pub fn packet(&self, rays: Rays, purpose: Purpose) {
+        self.add(Call::Packet(rays, purpose));
     }
 
-    /// Any hits of a packet.
-    pub fn any_of_packet(&self, rays: Rays) {
-        self.add(Call::AnyOfPacket(rays));
+    /// Numbers of packets and rays by purpose and depth, of a render on one thread.
+    pub fn tallies(&self) -> Vec<Tally> {
+        let (mut tallies, mut depth, mut last) = (Vec::<Tally>::new(), 0, Purpose::Camera);
+        for call in lock(&self.0).iter() {
+            let Call::Packet(rays, purpose) = call else { continue };
+            // A wave goes from the camera to ever deeper vertices, where it first finds surfaces and then light.
+            match purpose {
+                Purpose::Path if last != Purpose::Path => depth += 1,
+                Purpose::Camera => depth = 0,
+                _ => {}
+            }
+            last = *purpose;
+            let depth = if *purpose <= Purpose::Light { depth } else { 0 };
+            let known = tallies.iter().position(|tally| (tally.purpose, tally.depth) == (*purpose, depth));
+            let at = known.unwrap_or_else(|| {
+                tallies.push(Tally { purpose: *purpose, depth, packets: 0, rays: 0 });
+                tallies.len() - 1
+            });
+            tallies[at].packets += 1;
+            tallies[at].rays += active(rays) as u64;
+        }
+        tallies.sort_by_key(|tally| (tally.purpose, tally.depth));
+        tallies
     }
 
-    /// Traces all rays again; returns their number and the number of hits.
-    pub fn replay(&self, scene: &Committed) -> (usize, usize) {
+    /// Traces all rays again, or those of packets of one purpose; returns their number and the number of hits.
+    pub fn replay(&self, scene: &Committed, purpose: Option<Purpose>) -> (usize, usize) {
         let calls = lock(&self.0);
         let (mut rays, mut met) = (0, 0);
-        let active = |packet: &Rays| packet.active.iter().filter(|lane| **lane != 0).count();
         for call in calls.iter() {
             let (asked, found) = match call {
+                Call::Packet(_, other) if purpose.is_some_and(|purpose| purpose != *other) => (0, 0),
+                Call::Packet(packet, purpose) => (active(packet), trace(scene, packet, *purpose)),
+                _ if purpose.is_some() => (0, 0),
                 Call::First(ray) => (1, usize::from(scene.intersect(ray).is_some())),
                 Call::Any(ray) => (1, usize::from(scene.occluded(ray))),
-                Call::FirstOfPacket(packet, coherent) => {
-                    let hits = scene.intersect_packet(packet, *coherent);
-                    (
-                        active(packet),
-                        (0..16).filter(|&lane| packet.active[lane] != 0 && hits.get(lane).is_some()).count(),
-                    )
-                }
-                Call::AnyOfPacket(packet) => {
-                    let blocked = scene.occluded_packet(packet);
-                    (active(packet), blocked.iter().filter(|lane| **lane != 0).count())
-                }
             };
             (rays, met) = (rays + asked, met + found);
         }
         (rays, met)
     }
+}
+
+fn active(packet: &Rays) -> usize {
+    packet.active.iter().filter(|lane| **lane != 0).count()
+}
+
+/// Traces a packet; returns the number of hits.
+fn trace(scene: &Committed, packet: &Rays, purpose: Purpose) -> usize {
+    if matches!(purpose, Purpose::Light | Purpose::OffsetLight | Purpose::Connection) {
+        return scene.occluded_packet(packet).iter().filter(|lane| **lane != 0).count();
+    }
+    let hits = scene.intersect_packet(packet, purpose.is_coherent());
+    (0..16).filter(|&lane| packet.active[lane] != 0 && hits.get(lane).is_some()).count()
 }

@@ -6,7 +6,7 @@ use fluxion::Result;
 use fluxion::internals::math::{Vec3, vec3};
 use fluxion::mitsuba;
 use fluxion::scene::packet::{Rays, Surfaces};
-use fluxion::scene::{Ray, Scene};
+use fluxion::scene::{Purpose, Ray, Scene};
 
 use crate::common::sensor;
 
@@ -45,7 +45,12 @@ fn check(scene: &Scene, rows: &[Row], what: &str) {
         // Packets meet the same.
         let (mut rays, mut surfaces) = (Rays::NONE, Surfaces::default());
         (0..16).for_each(|lane| rays.set(lane, ray(x, y)));
-        let hit = scene.intersect_packet(&rays, fluxion::internals::math::lanes::Mask::first(16), true, &mut surfaces);
+        let hit = scene.intersect_packet(
+            &rays,
+            fluxion::internals::math::lanes::Mask::first(16),
+            Purpose::Camera,
+            &mut surfaces,
+        );
         assert!(hit.get(5) && surfaces.p.get(5).distance(surface.p) < 1e-3, "{what} at {x},{y}");
     }
 }

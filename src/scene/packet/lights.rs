@@ -5,7 +5,7 @@ use super::{Rays, Surfaces, surfaces};
 use crate::math::lanes::{Bits, LANES, Lanes, Lanes3, Mask};
 use crate::math::{Rgb, Vec3, vec2};
 use crate::scene::emitter::{EnvMap, EnvmapHits, LightPoint, Position};
-use crate::scene::{Scene, accel};
+use crate::scene::{Purpose, Scene, accel};
 
 /// Emitter points, as [`LightPoint`] has them.
 #[derive(Clone, Debug)]
@@ -282,8 +282,8 @@ impl Scene {
     }
 
     /// Active lanes whose emitter point is visible from the surface.
-    pub fn visible_packet(&self, from: &Surfaces, lights: &Lights, active: Mask) -> Mask {
-        active & !self.accel.occluded_packet(&shadow_rays(self.accel.size(), from, lights), active)
+    pub fn visible_packet(&self, from: &Surfaces, lights: &Lights, active: Mask, purpose: Purpose) -> Mask {
+        active & !self.accel.occluded_packet(&shadow_rays(self.accel.size(), from, lights), active, purpose)
     }
 
     /// Sets one lane to an emitter point that a path has hit, with its radiance and the density with which it would have

@@ -7,7 +7,7 @@ use crate::math::{Frame, Vec3, vec2};
 use crate::scene::closure::KINDS;
 use crate::scene::emitter::LightPoint;
 use crate::scene::shape::Geometry;
-use crate::scene::{Scene, Shape, Surface, accel, surface, texture};
+use crate::scene::{Purpose, Scene, Shape, Surface, accel, surface, texture};
 
 /// Sixteen orthonormal frames.
 #[derive(Clone, Copy, Debug)]
@@ -248,16 +248,15 @@ pub(super) fn epsilon(p: Lanes3, scene_size: f32) -> Lanes {
 }
 
 impl Scene {
-    /// Intersects the active rays with the scene; returns the lanes that hit a surface. `coherent`: the rays are close to
-    /// each other.
-    pub fn intersect_packet(&self, rays: &Rays, active: Mask, coherent: bool, surfaces: &mut Surfaces) -> Mask {
-        let hits = self.hits_of_packet(rays, active, coherent);
+    /// Intersects the active rays with the scene; returns the lanes that hit a surface.
+    pub fn intersect_packet(&self, rays: &Rays, active: Mask, purpose: Purpose, surfaces: &mut Surfaces) -> Mask {
+        let hits = self.hits_of_packet(rays, active, purpose);
         self.surfaces_of_packet(rays, &hits, active, surfaces)
     }
 
     /// The hits of the active rays, not yet completed.
-    pub fn hits_of_packet(&self, rays: &Rays, active: Mask, coherent: bool) -> Hits {
-        self.accel.intersect_packet(rays, active, coherent)
+    pub fn hits_of_packet(&self, rays: &Rays, active: Mask, purpose: Purpose) -> Hits {
+        self.accel.intersect_packet(rays, active, purpose)
     }
 
     /// Kind of the material that a ray has hit, to sort by; the largest number if it has hit nothing.
@@ -304,7 +303,7 @@ impl Scene {
 
     /// Active lanes whose surfaces are visible from each other.
     pub fn mutually_visible_packet(&self, a: &Surfaces, b: &Surfaces, active: Mask) -> Mask {
-        active & !self.accel.occluded_packet(&between(a, b), active)
+        active & !self.accel.occluded_packet(&between(a, b), active, Purpose::Connection)
     }
 }
 

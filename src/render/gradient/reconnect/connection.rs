@@ -4,8 +4,8 @@
 use super::difference::LastSegments;
 use super::offsets::SurfacePacket;
 use crate::math::lanes::{Lanes, Lanes3, Mask};
-use crate::scene::Scene;
 use crate::scene::packet::{Lights, Surfaces};
+use crate::scene::{Purpose, Scene};
 
 /// Largest Jacobian, and the inverse of the smallest one: beyond them single precision is not enough, and the shift fails
 /// in both directions.
@@ -69,7 +69,8 @@ impl LastSegments {
         let radiance = scene.light_radiance(lights, direction, in_range & evals.value.nonzero());
         let value = evals.value.scale(radiance);
         let carried = in_range & value.nonzero();
-        let lit = if carried.any() { scene.visible_packet(surfaces, lights, carried) } else { carried };
+        let lit =
+            if carried.any() { scene.visible_packet(surfaces, lights, carried, Purpose::OffsetLight) } else { carried };
         let density = scene.light_pdf(lights, (surfaces.p, angle), lit) + lights.scatter_pdf(evals.pdf);
         Self {
             contribution: lit.select3(value * jacobian, Lanes3::ZERO),

@@ -8,9 +8,9 @@ use super::segment::{NextVertices, ShiftContext};
 use super::states::{Kind, States};
 use crate::math::lanes::{Bits, LANES, Lanes, Lanes3, Mask};
 use crate::render::vertices::Vertices;
-use crate::scene::Scene;
 use crate::scene::bsdf::Lobe;
 use crate::scene::packet::{Rays, Surfaces};
+use crate::scene::{Purpose, Scene};
 
 /// An offset that is to leave its vertex by a half-vector copy.
 #[derive(Clone, Copy)]
@@ -23,9 +23,9 @@ struct Request {
     vertex_index: u32,
 }
 
-/// Aim that base paths leave their vertices for.
+/// Whatever base paths leave their vertices for.
 #[derive(Clone, Copy, PartialEq)]
-enum Purpose {
+enum Aim {
     /// The sampled emitter points.
     Light,
     /// The sampled directions.
@@ -96,7 +96,7 @@ impl Extensions {
             let connected = offsets.diffuse(context, states, unconnected & base_diffuse);
             self.request(slot, states, unconnected & !connected);
         }
-        self.extend(context, vertices, Purpose::Light, offsets);
+        self.extend(context, vertices, Aim::Light, offsets);
     }
 
     /// Extends the offsets that do not connect to their base paths' next vertices, or not for everything there.
@@ -116,7 +116,7 @@ impl Extensions {
             let connectable = offsets.diffuse(context, states, unconnected & base_diffuse);
             self.request(slot, states, unconnected & (!connectable | glossy));
         }
-        self.extend(context, vertices, Purpose::Scatter, offsets);
+        self.extend(context, vertices, Aim::Scatter, offsets);
     }
 
     fn request(&mut self, slot: usize, states: &States, lanes: Mask) {
@@ -125,16 +125,16 @@ impl Extensions {
     }
 
     /// Serves all requests, sixteen at a time.
-    fn extend(&mut self, context: &ShiftContext, vertices: &Vertices, purpose: Purpose, offsets: &mut OffsetSurfaces) {
+    fn extend(&mut self, context: &ShiftContext, vertices: &Vertices, aim: Aim, offsets: &mut OffsetSurfaces) {
         let requests = std::mem::take(&mut self.requests);
-        let extended = if purpose == Purpose::Light { &mut self.for_light } else { &mut self.for_scatter };
+        let extended = if aim == Aim::Light { &mut self.for_light } else { &mut self.for_scatter };
         extended.clear();
         if let Some(last) = requests.last() {
             extended.resize(last.slot + 1, NONE.clone());
         }
         self.count += requests.len() as u32;
         for packet in requests.chunks(LANES) {
-            self.extend_packet(context, vertices, (purpose, packet), offsets);
+            self.extend_packet(context, vertices, (aim, packet), offsets);
         }
         self.requests = requests;
         self.requests.clear();
@@ -144,7 +144,7 @@ impl Extensions {
         &mut self,
         context: &ShiftContext,
         vertices: &Vertices,
-        (purpose, requests): (Purpose, &[Request]),
+        (aim, requests): (Aim, &[Request]),
         offsets: &mut OffsetSurfaces,
     ) {
         let Self { offset, reached, .. } = self;
@@ -155,23 +155,22 @@ impl Extensions {
             lanes[to] = request.lane;
         }
         let lanes = &lanes[..requests.len()];
-        let copies = Copies::new(scene, &departures(vertices, lanes, purpose), offset);
+        let copies = Copies::new(scene, &departures(vertices, lanes, aim), offset);
         let rays = rays(&offset.surfaces, copies.wo);
-        let (first, reached) = match purpose {
-            Purpose::Light => (0, reached),
-            Purpose::Scatter => offsets.next_packet(context.base.len()),
+        let (first, reached) = match aim {
+            Aim::Light => (0, reached),
+            Aim::Scatter => offsets.next_packet(context.base.len()),
         };
-        let hit = scene.intersect_packet(&rays, copies.possible, false, &mut reached.surfaces);
+        let hit = scene.intersect_packet(&rays, copies.possible, Purpose::Extension, &mut reached.surfaces);
         let mut diffuse = Mask::NONE;
-        if purpose == Purpose::Scatter {
+        if aim == Aim::Scatter {
             reached.materials.evaluate(scene, &reached.surfaces, hit);
             diffuse = context.diffuse(reached.materials.roughness());
         }
-        let ends =
-            ends(scene, (vertices, lanes, purpose), (&offset.surfaces, &copies), (&rays, &reached.surfaces, hit));
-        let of_purpose = if purpose == Purpose::Light { &mut self.for_light } else { &mut self.for_scatter };
+        let ends = ends(scene, (vertices, lanes, aim), (&offset.surfaces, &copies), (&rays, &reached.surfaces, hit));
+        let of_aim = if aim == Aim::Light { &mut self.for_light } else { &mut self.for_scatter };
         for (from, &Request { slot, lane: to, .. }) in requests.iter().enumerate() {
-            let extended = &mut of_purpose[slot];
+            let extended = &mut of_aim[slot];
             extended.possible.set(to, copies.possible.get(from));
             extended.value.set(to, copies.value.get(from));
             extended.pdf.0[to] = copies.pdf.0[from];
@@ -184,15 +183,15 @@ impl Extensions {
 }
 
 /// How some base paths leave their vertices.
-fn departures<'a>(vertices: &'a Vertices, lanes: &'a [usize], purpose: Purpose) -> Departures<'a> {
+fn departures<'a>(vertices: &'a Vertices, lanes: &'a [usize], aim: Aim) -> Departures<'a> {
     let Vertices { surfaces, materials, scatters, light, .. } = vertices;
     let mut left =
         Departures { surfaces, materials, lanes, wi: Lanes3::ZERO, wo: Lanes3::ZERO, lobes: [Lobe::Smooth; LANES] };
     for (to, &lane) in lanes.iter().enumerate() {
         left.wi.set(to, surfaces.wi.get(lane));
-        match purpose {
-            Purpose::Light => left.wo.set(to, light.wo.get(lane)),
-            Purpose::Scatter => {
+        match aim {
+            Aim::Light => left.wo.set(to, light.wo.get(lane)),
+            Aim::Scatter => {
                 left.wo.set(to, scatters.wo.get(lane));
                 left.lobes[to] = scatters.lobe(lane);
             }
@@ -213,13 +212,13 @@ vectorized! {
 /// an emitter, too, and at infinity only if the base paths do.
 fn ends(
     scene: &Scene,
-    (vertices, lanes, purpose): (&Vertices, &[usize], Purpose),
+    (vertices, lanes, aim): (&Vertices, &[usize], Aim),
     (from, copies): (&Surfaces, &Copies),
     (rays, surfaces, hit): (&Rays, &Surfaces, Mask),
 ) -> LastSegments {
-    let (points, with_end) = match purpose {
-        Purpose::Light => (&vertices.light.points, vertices.lit),
-        Purpose::Scatter => (&vertices.emission.points, vertices.hits_emitter),
+    let (points, with_end) = match aim {
+        Aim::Light => (&vertices.light.points, vertices.lit),
+        Aim::Scatter => (&vertices.emission.points, vertices.hits_emitter),
     };
     let mut ends = LastSegments::NONE;
     let (mut on_surface, mut far) = (Mask::NONE, Mask::NONE);

@@ -7,8 +7,8 @@ use crate::math::lanes::{Bits, LANES, Lanes, Mask};
 use crate::render::camera::CameraSamples;
 use crate::render::half_edges::HalfEdges;
 use crate::render::vertices::Vertices;
-use crate::scene::Scene;
 use crate::scene::packet::{Materials, Rays, Surfaces};
+use crate::scene::{Purpose, Scene};
 
 /// Vertex index of an offset that hits nothing, and of pixels of the window without an index yet.
 pub const MISS: u32 = u32::MAX;
@@ -220,7 +220,7 @@ impl OffsetSurfaces {
             self.hits.push(Mask::NONE);
         }
         let packet = &mut self.camera[self.camera_used];
-        let mut hit = scene.intersect_packet(rays, Mask::first(count), true, &mut packet.surfaces);
+        let mut hit = scene.intersect_packet(rays, Mask::first(count), Purpose::OffsetCamera, &mut packet.surfaces);
         if scene.integrator().pass_emitters {
             scene.pass_emitters(rays, &mut hit, &mut packet.surfaces);
         }
