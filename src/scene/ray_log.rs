@@ -45,42 +45,38 @@ pub struct Tally {
     pub rays: u64,
 }
 
-/// A logged query.
-enum Call {
-    First(Ray),
-    Any(Ray),
-    Packet(Rays, Purpose),
+/// The queries, in the order of their kind.
+#[derive(Default)]
+struct Calls {
+    first: Vec<Ray>,
+    any: Vec<Ray>,
+    packets: Vec<(Rays, Purpose)>,
 }
 
-/// The calls in their order.
+/// The queries so far.
 #[derive(Default)]
-pub struct RayLog(Mutex<Vec<Call>>);
+pub struct RayLog(Mutex<Calls>);
 
 impl RayLog {
-    fn add(&self, call: Call) {
-        lock(&self.0).push(call);
-    }
-
     /// First hit of a ray.
     pub fn first(&self, ray: Ray) {
-        self.add(Call::First(ray));
+        lock(&self.0).first.push(ray);
     }
 
     /// Any hit of a ray.
     pub fn any(&self, ray: Ray) {
-        self.add(Call::Any(ray));
+        lock(&self.0).any.push(ray);
     }
 
     /// First or any hits of a packet.
     pub fn packet(&self, rays: Rays, purpose: Purpose) {
-        self.add(Call::Packet(rays, purpose));
+        lock(&self.0).packets.push((rays, purpose));
     }
 
     /// Numbers of packets and rays by purpose and depth, of a render on one thread.
     pub fn tallies(&self) -> Vec<Tally> {
         let (mut tallies, mut depth, mut last) = (Vec::<Tally>::new(), 0, Purpose::Camera);
-        for call in lock(&self.0).iter() {
-            let Call::Packet(rays, purpose) = call else { continue };
+        for (rays, purpose) in &lock(&self.0).packets {
             // A wave goes from the camera to ever deeper vertices, where it first finds surfaces and then light.
             match purpose {
                 Purpose::Path if last != Purpose::Path => depth += 1,
@@ -105,15 +101,14 @@ impl RayLog {
     pub fn replay(&self, scene: &Committed, purpose: Option<Purpose>) -> (usize, usize) {
         let calls = lock(&self.0);
         let (mut rays, mut met) = (0, 0);
-        for call in calls.iter() {
-            let (asked, found) = match call {
-                Call::Packet(_, other) if purpose.is_some_and(|purpose| purpose != *other) => (0, 0),
-                Call::Packet(packet, purpose) => (active(packet), trace(scene, packet, *purpose)),
-                _ if purpose.is_some() => (0, 0),
-                Call::First(ray) => (1, usize::from(scene.intersect(ray).is_some())),
-                Call::Any(ray) => (1, usize::from(scene.occluded(ray))),
-            };
-            (rays, met) = (rays + asked, met + found);
+        for (packet, of) in calls.packets.iter().filter(|(_, of)| purpose.is_none_or(|purpose| purpose == *of)) {
+            rays += active(packet);
+            met += trace(scene, packet, *of);
+        }
+        if purpose.is_none() {
+            rays += calls.first.len() + calls.any.len();
+            met += calls.first.iter().filter(|ray| scene.intersect(ray).is_some()).count();
+            met += calls.any.iter().filter(|ray| scene.occluded(ray)).count();
         }
         (rays, met)
     }
