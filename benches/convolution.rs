@@ -3,10 +3,14 @@
 //! With a Python that has PyTorch, whose convolutions are oneDNN's, it takes turns with these, in channels-last order. One
 //! thread; medians of five, in seconds and thousand millions of operations a second.
 
+mod common;
+
 use std::process::Command;
 use std::time::Instant;
 
 use fluxion::internals::nn::{Activation, Convolution, Tensor};
+
+use self::common::median;
 
 const RUNS: usize = 5;
 const SIZE: (usize, usize) = (1280, 720);
@@ -62,9 +66,4 @@ fn other(python: &str, layer: [usize; 3]) -> f64 {
     let output = Command::new(python).args(["-c", OTHER]).args(arguments).output().expect("a Python");
     let text = String::from_utf8_lossy(&output.stdout);
     text.trim().parse().unwrap_or_else(|_| panic!("{}", String::from_utf8_lossy(&output.stderr)))
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
 }

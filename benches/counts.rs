@@ -4,6 +4,8 @@
 //! nanoseconds of one thread for a sample, those of them that Embree takes by itself for every purpose of rays, and rays and packets by
 //! purpose and depth. The render is deterministic; times are medians of three.
 
+mod common;
+
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -15,6 +17,8 @@ use fluxion::reconstruct::{self, Context};
 use fluxion::render::{Budget, Control, RenderSettings, render};
 use fluxion::scene::{Purpose, Scene, Tally};
 use serde_json::{Value, json};
+
+use self::common::median;
 
 const ROUNDS: usize = 3;
 const SPP: u32 = 24;
@@ -109,9 +113,4 @@ fn run(scene: &Scene, mode: Mode) -> Result<Duration> {
         reconstruction: None,
     };
     Ok(adaptive::run(scene, &settings, &Control::QUIET, &Context::QUIET)?.render.elapsed)
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
 }

@@ -5,6 +5,8 @@
 //! second thread gives, how far time is from linear in samples and in pixels (1 is linear), and what leaving out saves. Needs two cores
 //! and nothing else running.
 
+mod common;
+
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
@@ -14,6 +16,8 @@ use fluxion::internals::plan::Plan;
 use fluxion::mitsuba;
 use fluxion::render::{Budget, Control, RenderSettings, render};
 use fluxion::scene::Scene;
+
+use self::common::median;
 
 const ROUNDS: usize = 5;
 const SPP: u32 = 4;
@@ -136,9 +140,4 @@ fn seconds(scene: &Scene, spp: u32, needs: Needs) -> f64 {
 
 fn bytes(needs: Needs) -> f64 {
     needs.bytes_per_pixel() as f64
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
 }

@@ -73,6 +73,13 @@ pub enum Kernel {
     Chosen(Arc<Neighbours>),
 }
 
+impl Kernel {
+    /// The neighbours, if they were chosen.
+    pub fn neighbours(&self) -> Option<&Neighbours> {
+        if let Self::Chosen(neighbours) = self { Some(neighbours) } else { None }
+    }
+}
+
 impl Film {
     /// An empty film.
     pub fn new(width: usize, height: usize, needs: Needs) -> Self {
@@ -124,9 +131,9 @@ impl Film {
         &mut self.tiles
     }
 
-    /// Number of tiles.
-    pub fn tiles(&self) -> usize {
-        self.tiles.len()
+    /// All tiles.
+    pub fn tiles(&self) -> &[Tile] {
+        &self.tiles
     }
 
     /// Samples of all pixels.

@@ -119,6 +119,11 @@ impl Tile {
         (self.x + index % self.width, self.y + index / self.width)
     }
 
+    /// Columns and rows in the film of all pixels.
+    pub fn pixels(&self) -> Vec<(usize, usize)> {
+        (0..self.width * self.height).map(|index| self.pixel(index)).collect()
+    }
+
     /// Number of samples of pixel `index` that a statistic was accumulated from.
     pub(super) fn count_of(&self, of_edges: bool, index: usize) -> u32 {
         if of_edges { self.edge_count(index) } else { self.count(index) }

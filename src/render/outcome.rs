@@ -44,7 +44,8 @@ impl RenderOutcome {
 
     /// A film with its samples, as if no time had been spent on it.
     pub(crate) fn of(film: Film) -> Self {
-        let choices = Choices { grids: PerTile::new(film.tiles()), shares: Shares::new(film.tiles()), encoder: None };
+        let tiles = film.tiles().len();
+        let choices = Choices { grids: PerTile::new(tiles), shares: Shares::new(tiles), encoder: None };
         let spp = film.fewest_samples();
         Self { film, spp, elapsed: Duration::ZERO, stopped: false, first_rejected: None, choices }
     }

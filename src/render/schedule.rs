@@ -225,7 +225,7 @@ fn run_tiles(
     let first_rejected = Mutex::new(outcome.first_rejected);
     let due = AtomicBool::new(false);
     let kernel = outcome.film.kernel().clone();
-    let neighbours = if let Kernel::Chosen(neighbours) = &kernel { Some(&**neighbours) } else { None };
+    let neighbours = kernel.neighbours();
     let tiles = outcome.film.tiles_mut();
     let (total, done) = (tiles.len(), Mutex::new(0));
     let wave_of = || Wave::new(scene, settings.needs, settings.shift, neighbours);
@@ -275,7 +275,7 @@ fn run_tile(
         .collect();
     let due = || spans.iter().filter(|span| !span.is_empty());
     let (start, end) = (due().map(|span| span.start).min()?, due().map(|span| span.end).max()?);
-    let all: Vec<_> = (0..spans.len()).map(|pixel| tile.pixel(pixel)).collect();
+    let all = tile.pixels();
     let all_cells = choices.grids.get(number, || seen::grids(wave.scene(), &all));
     let (mut numbers, mut pixels, mut cells) = (Vec::new(), Vec::new(), Vec::new());
     for index in start..end {
@@ -292,12 +292,7 @@ fn run_tile(
         cells.clear();
         cells.extend(numbers.iter().filter_map(|&pixel| all_cells.get(pixel).copied()));
         let id = (settings.seed, settings.first + index);
-        let mut pays = || {
-            choices.shares.has_differences(number, id.1, || {
-                wave.trace((settings.seed, 0), &all, &[], true);
-                wave.work()
-            })
-        };
+        let mut pays = || choices.shares.has_differences(number, id.1, || wave.first_work(settings.seed, &all));
         let differences = !pending && (settings.needs.edges != EdgeNeed::Thinned || pays());
         let samples = wave.trace(id, &pixels, &cells, differences);
         if let Some(sink) = control.samples {

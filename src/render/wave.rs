@@ -111,6 +111,12 @@ impl<'a> Wave<'a> {
         Samples { all: samples, lights: lights.all(), half_edges, slots: self.slots }
     }
 
+    /// Work of sample number zero of all pixels of a tile, with differences if the film records them.
+    pub fn first_work(&mut self, seed: u64, pixels: &[(usize, usize)]) -> Work {
+        self.trace((seed, 0), pixels, &[], true);
+        self.work()
+    }
+
     /// Work of the latest wave.
     pub fn work(&self) -> Work {
         self.record.work

@@ -32,6 +32,7 @@ pub use self::scatter::{Deltas, Draws, Evals, Numbers, Proposals, Scatters};
 pub use self::thin::PrincipledThin;
 use crate::math::lanes::{Bits, LANES, Lanes, Lanes3, Mask};
 use crate::math::{Rgb, Vec2, Vec3, warp};
+use crate::scene::packet::Frames;
 
 /// Kinds of lobes that closures have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -80,6 +81,16 @@ pub struct Closures<const N: usize = LANES> {
     opacity: Lanes<N>,
     perturbation: Perturbation<N>,
     parameters: [Lanes<N>; PARAMETERS],
+}
+
+/// Way from the directions of a surface to those that its lobes see.
+struct Side<const N: usize> {
+    /// Lanes that are seen from behind.
+    behind: Mask<N>,
+    /// Lanes under a perturbed normal.
+    perturbed: Mask<N>,
+    /// The perturbed frames.
+    frame: Frames<N>,
 }
 
 /// A single closure.
@@ -264,16 +275,21 @@ where
         Evals { value: evals.value * share, pdf: evals.pdf * self.opacity }
     }
 
+    /// Directions as the lobes of the active lanes see them, and the way back.
+    #[inline(always)]
+    fn enter(&self, from: Lanes3<N>, active: Mask<N>) -> (Lanes3<N>, Side<N>) {
+        let behind = self.behind(from);
+        let wi = from.mirror(behind);
+        let perturbed = active & self.perturbation.lanes;
+        let frame = self.perturbation.frame(wi);
+        let seen = if perturbed.any() { perturbed.select3(frame.to_local(wi), wi) } else { wi };
+        (seen, Side { behind, perturbed, frame })
+    }
+
     /// Samples directions for the active lanes; returns the lanes that have one.
     #[inline(always)]
     pub fn sample(&self, from: Lanes3<N>, (lobe, u): (Lanes<N>, [Lanes<N>; 2]), active: Mask<N>) -> Draws<N> {
-        let behind = self.behind(from);
-        let mut wi = from.mirror(behind);
-        let perturbed = active & self.perturbation.lanes;
-        let frame = self.perturbation.frame(wi);
-        if perturbed.any() {
-            wi = perturbed.select3(frame.to_local(wi), wi);
-        }
+        let (wi, Side { behind, perturbed, frame }) = self.enter(from, active);
         let hole = active & !lobe.less(self.opacity);
         let (mut scatters, mut found) = self.sample_lobes(wi, [lobe / self.opacity, u[0], u[1]], active & !hole);
         if perturbed.any() {
@@ -291,6 +307,7 @@ where
         }
         (scatters, found | hole)
     }
+
     /// Scattering by a delta lobe in the active lanes; of others anything.
     #[inline(always)]
     pub fn deltas(&self, from: Lanes3<N>, lobe: Lobe, active: Mask<N>) -> Deltas<N> {
@@ -298,13 +315,7 @@ where
             let hole = Deltas { wo: -from, value: Lanes3::ONE, probability: Lanes::ONE };
             return hole.scaled(Lanes::ONE - self.opacity);
         }
-        let behind = self.behind(from);
-        let mut wi = from.mirror(behind);
-        let perturbed = active & self.perturbation.lanes;
-        let frame = self.perturbation.frame(wi);
-        if perturbed.any() {
-            wi = perturbed.select3(frame.to_local(wi), wi);
-        }
+        let (wi, Side { behind, perturbed, frame }) = self.enter(from, active);
         let mut deltas = self.delta_lobes(wi, lobe, active).scaled(self.opacity);
         if perturbed.any() {
             let wo = frame.to_world(deltas.wo);

@@ -151,17 +151,10 @@ impl EnvMap {
         [u.min(Lanes::splat(ALMOST_ONE)), v]
     }
 
-    /// Has the texels around a point brought into the cache.
-    #[inline]
-    fn prefetch(&self, uv: Vec2) {
-        let (width, height) = (self.texels.width, self.texels.height);
-        let y = ((uv.y * (height - 1) as f32) as usize).min(height - 2);
-        self.texels.prefetch(((uv.x * width as f32 - 0.5) as usize).min(width - 1), [y, y + 1]);
-    }
-
-    /// Columns have their centres at half numbers and wrap around; the first and last row are the poles.
-    #[inline]
-    fn look_up(&self, uv: Vec2) -> Rgb {
+    /// Columns and rows of the texels around a point, and how far it is from the first to the others. Columns have their centres at half numbers
+    /// and wrap around; the first and last row are the poles.
+    #[inline(always)]
+    fn cell(&self, uv: Vec2) -> ([usize; 2], [usize; 2], Vec2) {
         let (width, height) = (self.texels.width, self.texels.height);
         let at = vec2(uv.x * width as f32 - 0.5, uv.y * (height - 1) as f32);
         let y = (at.y as usize).min(height - 2);
@@ -169,8 +162,22 @@ impl EnvMap {
         let (right, x) = ((at.x + 1.0) as usize, ((at.x + 1.0) as usize) as f32 - 1.0);
         let (left, right) =
             (if right == 0 { width - 1 } else { (right - 1).min(width - 1) }, if right >= width { 0 } else { right });
-        let [a, b, c, d] = self.texels.square([left, right], [y, y + 1]);
-        a.lerp(b, at.x - x).lerp(c.lerp(d, at.x - x), at.y - y as f32) * self.scale
+        ([left, right], [y, y + 1], vec2(at.x - x, at.y - y as f32))
+    }
+
+    /// Has the texels around a point brought into the cache.
+    #[inline]
+    fn prefetch(&self, uv: Vec2) {
+        let ([left, _], rows, _) = self.cell(uv);
+        self.texels.prefetch(left, rows);
+    }
+
+    /// Radiance at a point, interpolated between texels.
+    #[inline]
+    fn look_up(&self, uv: Vec2) -> Rgb {
+        let (columns, rows, fraction) = self.cell(uv);
+        let [a, b, c, d] = self.texels.square(columns, rows);
+        a.lerp(b, fraction.x).lerp(c.lerp(d, fraction.x), fraction.y) * self.scale
     }
 }
 

@@ -165,17 +165,10 @@ impl Surfaces {
     /// Copies one lane of other surfaces.
     #[inline(always)]
     pub fn copy(&mut self, to: usize, from: &Self, lane: usize) {
-        let copy3 = |to_lanes: &mut Lanes3, from_lanes: &Lanes3| to_lanes.set(to, from_lanes.get(lane));
-        copy3(&mut self.p, &from.p);
-        copy3(&mut self.n, &from.n);
-        copy3(&mut self.frame.s, &from.frame.s);
-        copy3(&mut self.frame.t, &from.frame.t);
-        copy3(&mut self.frame.n, &from.frame.n);
-        copy3(&mut self.wi, &from.wi);
-        copy3(&mut self.dp_du, &from.dp_du);
-        copy3(&mut self.dp_dv, &from.dp_dv);
-        self.epsilon.0[to] = from.epsilon.0[lane];
-        self.curvature.0[to] = from.curvature.0[lane];
+        self.copy_place(to, from, lane);
+        self.wi.set(to, from.wi.get(lane));
+        self.dp_du.set(to, from.dp_du.get(lane));
+        self.dp_dv.set(to, from.dp_dv.get(lane));
         self.shape.0[to] = from.shape.0[lane];
         self.instance.0[to] = from.instance.0[lane];
         self.primitive.0[to] = from.primitive.0[lane];

@@ -131,11 +131,17 @@ impl Bitmap {
         vec2(self.texels.width as f32, self.texels.height as f32)
     }
 
-    fn footprint(&self, point: &Point) -> Footprint {
+    /// Columns and rows of the four texels around a point, not yet wrapped, and how far it is from the first to the others.
+    #[inline]
+    fn cell(&self, point: &Point) -> ([i64; 2], [i64; 2], Vec2) {
         let at = self.to_uv.apply(point.uv) * self.size() - 0.5;
         let corner = at.floor();
         let (x, y) = (corner.x as i64, corner.y as i64);
-        let [columns, rows] = [[x, x.saturating_add(1)], [y, y.saturating_add(1)]];
+        ([x, x.saturating_add(1)], [y, y.saturating_add(1)], at - corner)
+    }
+
+    fn footprint(&self, point: &Point) -> Footprint {
+        let (columns, rows, fraction) = self.cell(point);
         let texels = match self.wrap {
             [Wrap::Border(_), _] | [_, Wrap::Border(_)] => {
                 let at = |k: usize| self.fetch(columns[k % 2], rows[k / 2]);
@@ -148,7 +154,7 @@ impl Bitmap {
                 self.texels.square(columns, rows)
             }
         };
-        Footprint { texels, fraction: at - corner }
+        Footprint { texels, fraction }
     }
 
     fn average(&self) -> f32 {
@@ -169,11 +175,9 @@ impl Texture for Bitmap {
     }
 
     fn prefetch(&self, point: &Point) {
-        let corner = (self.to_uv.apply(point.uv) * self.size() - 0.5).floor();
-        let (width, height) = (self.texels.width, self.texels.height);
-        let (x, y) = (corner.x as i64, corner.y as i64);
-        let rows = [y, y.saturating_add(1)].map(|y| self.wrap[1].apply(y, height));
-        self.texels.prefetch(self.wrap[0].apply(x, width), rows);
+        let (columns, rows, _) = self.cell(point);
+        let rows = rows.map(|row| self.wrap[1].apply(row, self.texels.height));
+        self.texels.prefetch(self.wrap[0].apply(columns[0], self.texels.width), rows);
     }
 
     fn gradient(&self, point: &Point) -> Vec2 {

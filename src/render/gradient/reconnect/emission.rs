@@ -11,7 +11,7 @@ impl Segment<'_> {
     #[inline(always)]
     pub fn emission_differences(&self, context: &ShiftContext) -> SegmentDifferences {
         let Self { vertices, offset, leaving, connectable, extended, .. } = *self;
-        let mut differences = SegmentDifferences { color: Lanes3::ZERO, ambient: Lanes3::ZERO };
+        let mut differences = SegmentDifferences::NONE;
         let emits = leaving & vertices.hits_emitter;
         if emits.any() {
             let emission = &vertices.emission;

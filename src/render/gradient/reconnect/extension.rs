@@ -56,8 +56,8 @@ pub struct Extended {
 #[derive(Default)]
 pub struct Extensions {
     requests: Vec<Request>,
-    for_light: Vec<Extended>,
-    for_scatter: Vec<Extended>,
+    /// Results by aim.
+    extended: [Vec<Extended>; 2],
     offset: SurfacePacket,
     reached: SurfacePacket,
     /// Offsets that were extended so far.
@@ -78,7 +78,8 @@ static NONE: Extended = Extended {
 impl Extensions {
     /// Offsets across a half-edge, for light and for the continuation.
     pub fn get(&self, slot: usize) -> (&Extended, &Extended) {
-        (self.for_light.get(slot).unwrap_or(&NONE), self.for_scatter.get(slot).unwrap_or(&NONE))
+        let [light, scatter] = &self.extended;
+        (light.get(slot).unwrap_or(&NONE), scatter.get(slot).unwrap_or(&NONE))
     }
 
     /// Extends the offsets that do not connect to emitter points sampled at their base paths' vertices.
@@ -127,7 +128,7 @@ impl Extensions {
     /// Serves all requests, sixteen at a time.
     fn extend(&mut self, context: &ShiftContext, vertices: &Vertices, aim: Aim, offsets: &mut OffsetSurfaces) {
         let requests = std::mem::take(&mut self.requests);
-        let extended = if aim == Aim::Light { &mut self.for_light } else { &mut self.for_scatter };
+        let extended = &mut self.extended[aim as usize];
         extended.clear();
         if let Some(last) = requests.last() {
             extended.resize(last.slot + 1, NONE.clone());
@@ -168,9 +169,8 @@ impl Extensions {
             diffuse = context.diffuse(reached.materials.roughness());
         }
         let ends = ends(scene, (vertices, lanes, aim), (&offset.surfaces, &copies), (&rays, &reached.surfaces, hit));
-        let of_aim = if aim == Aim::Light { &mut self.for_light } else { &mut self.for_scatter };
         for (from, &Request { slot, lane: to, .. }) in requests.iter().enumerate() {
-            let extended = &mut of_aim[slot];
+            let extended = &mut self.extended[aim as usize][slot];
             extended.possible.set(to, copies.possible.get(from));
             extended.value.set(to, copies.value.get(from));
             extended.pdf.0[to] = copies.pdf.0[from];
