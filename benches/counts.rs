@@ -22,12 +22,11 @@ use self::common::median;
 
 const ROUNDS: usize = 3;
 const SPP: u32 = 24;
-const PURPOSES: [(Purpose, &str); 7] = [
+const PURPOSES: [(Purpose, &str); 6] = [
     (Purpose::Camera, "camera"),
     (Purpose::Path, "path"),
     (Purpose::Light, "light"),
     (Purpose::OffsetCamera, "offset_camera"),
-    (Purpose::OffsetLight, "offset_light"),
     (Purpose::Connection, "connection"),
     (Purpose::Extension, "extension"),
 ];

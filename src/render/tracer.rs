@@ -3,6 +3,7 @@
 use super::Sampler;
 use super::camera::CameraSamples;
 use super::continuation::shade;
+use super::direct::DirectLight;
 use super::paths::{Order, Packet, Paths};
 use super::record::PathRecord;
 use super::vertices::Vertices;
@@ -21,12 +22,14 @@ pub struct PathTracer<'a> {
     paths: Paths,
     next: Paths,
     order: Order,
+    direct: DirectLight,
 }
 
 impl<'a> PathTracer<'a> {
     /// A tracer that computes what a film with these needs records.
     pub fn new(scene: &'a Scene, needs: Needs) -> Self {
-        Self { scene, needs, paths: Paths::default(), next: Paths::default(), order: Order::default() }
+        let (paths, next) = (Paths::default(), Paths::default());
+        Self { scene, needs, paths, next, order: Order::default(), direct: DirectLight::default() }
     }
 
     /// Traces paths from the camera samples. `keep_all`: record the vertices of all depths instead of the latest only.
@@ -76,7 +79,7 @@ impl<'a> PathTracer<'a> {
     /// Takes all paths to their next vertices, which become level `at` of the record, and scatters them there. Behind the
     /// camera's surfaces, paths are sorted by the kinds of material that they have come to.
     fn advance(&mut self, sampler: Sampler, depth: u32, (at, keep_all): (usize, bool), record: &mut PathRecord) {
-        let Self { scene, needs, paths, next, order } = self;
+        let Self { scene, needs, paths, next, order, direct } = self;
         if record.levels.len() == at {
             record.levels.push(Vec::new());
         }
@@ -105,7 +108,7 @@ impl<'a> PathTracer<'a> {
                 continue;
             }
             let shaded = shade((scene, &sampler), depth, packet, vertices, (k * LANES) as u32, next);
-            record.add_direct(scene, vertices, &shaded);
+            direct.hold(scene, (k, vertices), shaded);
             if needs.has(Recorded::Alpha) || scene.integrator().hide_emitters {
                 record.cover(packet, vertices.hit & !vertices.passed);
             }
@@ -113,6 +116,7 @@ impl<'a> PathTracer<'a> {
                 record.update_after_scatter(vertices, needs.has(Recorded::Ambient));
             }
         }
+        direct.add(scene, &mut level, record);
         record.levels[at] = level;
     }
 }

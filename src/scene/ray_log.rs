@@ -17,9 +17,7 @@ pub enum Purpose {
     Light,
     /// Surfaces that the camera sees in the pixels that paths are shifted to.
     OffsetCamera,
-    /// Emitter points that offsets are connected to.
-    OffsetLight,
-    /// Vertices of base paths that offsets are connected to.
+    /// Emitter points and vertices of base paths that offsets are connected to.
     Connection,
     /// Next vertices of offsets that are not connected.
     Extension,
@@ -120,7 +118,7 @@ fn active(packet: &Rays) -> usize {
 
 /// Traces a packet; returns the number of hits.
 fn trace(scene: &Committed, packet: &Rays, purpose: Purpose) -> usize {
-    if matches!(purpose, Purpose::Light | Purpose::OffsetLight | Purpose::Connection) {
+    if matches!(purpose, Purpose::Light | Purpose::Connection) {
         return scene.occluded_packet(packet).iter().filter(|lane| **lane != 0).count();
     }
     let hits = scene.intersect_packet(packet, purpose.is_coherent());

@@ -5,7 +5,7 @@ use super::{Rays, Surfaces, surfaces};
 use crate::math::lanes::{Bits, LANES, Lanes, Lanes3, Mask};
 use crate::math::{Rgb, Vec3, vec2};
 use crate::scene::emitter::{EnvMap, EnvmapHits, LightPoint, Position};
-use crate::scene::{Purpose, Scene, accel};
+use crate::scene::{Scene, accel};
 
 /// Emitter points, as [`LightPoint`] has them.
 #[derive(Clone, Debug)]
@@ -109,6 +109,17 @@ impl Lights {
         let of_surface = cosine.greater(Lanes::ZERO).select(cosine * per_distance, Lanes::ZERO);
         let angle = self.surface.select(of_surface, self.far.select(one, per_distance));
         (self.far.select3(self.at, direction), angle)
+    }
+
+    /// Shadow rays from surfaces towards the points.
+    #[inline(always)]
+    pub(super) fn shadow_rays(&self, scene_size: f32, from: &Surfaces) -> Rays {
+        let towards = self.far.select3(self.at, self.at - from.p);
+        let origin = from.leave(towards);
+        let near = surfaces::offset(self.at, self.n, surfaces::epsilon(self.at, scene_size), from.p - self.at);
+        let end = self.surface.select3(near, self.at);
+        let t_far = self.far.select(Lanes::splat(f32::INFINITY), Lanes::splat(accel::SHADOW_END));
+        Rays { origin, direction: self.far.select3(self.at, end - origin), t_far }
     }
 
     /// Densities of hitting the points by scattering of density `pdf`: zero for emitters of a single point.
@@ -281,11 +292,6 @@ impl Scene {
         Some(hits)
     }
 
-    /// Active lanes whose emitter point is visible from the surface.
-    pub fn visible_packet(&self, from: &Surfaces, lights: &Lights, active: Mask, purpose: Purpose) -> Mask {
-        active & !self.accel.occluded_packet(&shadow_rays(self.accel.size(), from, lights), active, purpose)
-    }
-
     /// Sets one lane to an emitter point that a path has hit, with its radiance and the density with which it would have
     /// been sampled.
     pub fn keep_light(&self, lights: &mut Lights, lane: usize, point: LightPoint, (radiance, pdf): (Rgb, f32)) {
@@ -304,16 +310,5 @@ vectorized! {
     /// [`EnvMap::hits`] in the widest vectors that there are.
     fn envmap_hits(map: &EnvMap, rays: &Rays, active: Mask) -> EnvmapHits {
         map.hits(rays.direction, active)
-    }
-}
-
-vectorized! {
-    fn shadow_rays(scene_size: f32, from: &Surfaces, lights: &Lights) -> Rays {
-        let towards = lights.far.select3(lights.at, lights.at - from.p);
-        let origin = from.leave(towards);
-        let near = surfaces::offset(lights.at, lights.n, surfaces::epsilon(lights.at, scene_size), from.p - lights.at);
-        let end = lights.surface.select3(near, lights.at);
-        let t_far = lights.far.select(Lanes::splat(f32::INFINITY), Lanes::splat(accel::SHADOW_END));
-        Rays { origin, direction: lights.far.select3(lights.at, end - origin), t_far }
     }
 }

@@ -7,10 +7,12 @@ mod info;
 mod lights;
 mod materials;
 mod rays;
+mod shadows;
 mod surfaces;
 
 pub(super) use self::info::{EmitterInfo, ShapeInfo};
 pub use self::lights::Lights;
 pub use self::materials::Materials;
 pub use self::rays::Rays;
+pub use self::shadows::{ShadowRays, ShadowRequest};
 pub use self::surfaces::{Frames, Hits, Surfaces};

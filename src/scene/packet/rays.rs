@@ -34,6 +34,12 @@ impl Rays {
         self.t_far.0[lane] = ray.t_far;
     }
 
+    /// Copies one lane of other rays.
+    #[inline(always)]
+    pub fn copy(&mut self, to: usize, from: &Self, lane: usize) {
+        self.set(to, from.get(lane));
+    }
+
     /// As Embree takes them.
     #[inline(always)]
     pub(in crate::scene) fn to_embree(self, active: Mask) -> embree::Rays {

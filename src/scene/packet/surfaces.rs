@@ -7,7 +7,7 @@ use crate::math::{Frame, Vec3, vec2};
 use crate::scene::closure::KINDS;
 use crate::scene::emitter::LightPoint;
 use crate::scene::shape::Geometry;
-use crate::scene::{Purpose, Scene, Shape, Surface, accel, surface, texture};
+use crate::scene::{Purpose, Scene, Shape, Surface, surface, texture};
 
 /// Sixteen orthonormal frames.
 #[derive(Clone, Copy, Debug)]
@@ -292,19 +292,6 @@ impl Scene {
     pub fn light_point_of(&self, surfaces: &Surfaces, lane: usize) -> Option<LightPoint> {
         let emitter = self.shape_infos[surfaces.shape.0[lane] as usize].emitter?;
         Some(LightPoint::on_surface(&surfaces.get(lane), emitter))
-    }
-
-    /// Active lanes whose surfaces are visible from each other.
-    pub fn mutually_visible_packet(&self, a: &Surfaces, b: &Surfaces, active: Mask) -> Mask {
-        active & !self.accel.occluded_packet(&between(a, b), active, Purpose::Connection)
-    }
-}
-
-vectorized! {
-    fn between(a: &Surfaces, b: &Surfaces) -> Rays {
-        let origin = a.leave(b.p - a.p);
-        let end = b.leave(a.p - b.p);
-        Rays { origin, direction: end - origin, t_far: Lanes::splat(accel::SHADOW_END) }
     }
 }
 

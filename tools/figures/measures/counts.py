@@ -8,7 +8,7 @@ from scenes import ROOT
 
 REFERENCES = False
 
-PURPOSES = ["camera", "path", "light", "offset_camera", "offset_light", "connection", "extension"]
+PURPOSES = ["camera", "path", "light", "offset_camera", "connection", "extension"]
 
 
 def cells(run, where):

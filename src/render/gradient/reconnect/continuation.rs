@@ -1,8 +1,7 @@
 //! Offsets on the way to the next vertices of their base paths: connected, extended or closed.
 
 use super::SegmentDifferences;
-use super::connection::Connections;
-use super::segment::{Segment, ShiftContext};
+use super::segment::Segment;
 use super::states::{LevelStates, Prefixes};
 use crate::math::lanes::{Lanes, Lanes3, Mask};
 use crate::scene::closure::Evals;
@@ -11,7 +10,7 @@ impl Segment<'_> {
     /// Sets the states of the offsets at the next vertices, across a half-edge of each path. Returns all further differences of the
     /// offsets that are closed there.
     #[inline(always)]
-    pub fn continue_offsets(&self, context: &ShiftContext, states: (&mut LevelStates, usize)) -> SegmentDifferences {
+    pub fn continue_offsets(&self, states: (&mut LevelStates, usize)) -> SegmentDifferences {
         let exists = self.leaving & self.next.exists;
         let (joined, unconnected) = (exists & !self.unconnected, exists & self.unconnected);
         let mut closed = SegmentDifferences::NONE;
@@ -19,7 +18,7 @@ impl Segment<'_> {
             closed = self.joined(joined);
         }
         if unconnected.any() {
-            closed += self.continue_unconnected(context, unconnected, states);
+            closed += self.continue_unconnected(unconnected, states);
         }
         closed
     }
@@ -51,21 +50,15 @@ impl Segment<'_> {
     /// Offsets are connected where they can be, but not to a glossy next vertex: for its light, its continuation, or both, they
     /// keep a vertex of their own, as do offsets that cannot be connected over this segment.
     #[inline(always)]
-    fn continue_unconnected(
-        &self,
-        context: &ShiftContext,
-        lanes: Mask,
-        (states, slot): (&mut LevelStates, usize),
-    ) -> SegmentDifferences {
+    fn continue_unconnected(&self, lanes: Mask, (states, slot): (&mut LevelStates, usize)) -> SegmentDifferences {
         let Self { vertices, next, extended, .. } = *self;
-        let connectable = lanes & self.connectable;
+        let connectable = lanes & self.connected.connectable;
+        let to_vertices = &self.connected.next;
         let (mut connected, mut joint) = (Mask::NONE, None);
-        let connects = connectable & next.connects;
-        if connects.any() {
-            let found = Connections::new(context.scene, vertices.surfaces.p, self.offset, &next.surfaces, connects);
-            let (prefix, carried) = self.extended_prefix(Evals { value: found.value, pdf: found.pdf });
-            connected = connects & carried & found.possible;
-            joint = Some((prefix, found.wi));
+        if to_vertices.possible.any() {
+            let (prefix, carried) = self.extended_prefix(Evals { value: to_vertices.value, pdf: to_vertices.pdf });
+            connected = lanes & carried & to_vertices.possible;
+            joint = Some((prefix, to_vertices.wi));
         }
         let (prefix, carried) = self.extended_prefix(Evals { value: extended.value, pdf: extended.pdf });
         let kept = lanes & carried & extended.possible & extended.hit;

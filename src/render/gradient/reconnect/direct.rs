@@ -1,8 +1,8 @@
 //! Differences of the light from emitter points that next-event estimation has sampled at the base paths' vertices.
 
+use super::connection::LightConnections;
 use super::difference::{Contributions, LastSegments};
 use super::extension::Extended;
-use super::offsets::SurfacePacket;
 use super::segment::ShiftContext;
 use super::states::{Kind, States};
 use crate::math::lanes::{Lanes, Lanes3, Mask};
@@ -13,7 +13,7 @@ use crate::render::vertices::Vertices;
 pub fn sampled_emitters(
     context: &ShiftContext,
     vertices: &Vertices,
-    (offset, extended): (&SurfacePacket, &Extended),
+    (connected, extended): (&LightConnections, &Extended),
     states: &States,
     active: Mask,
 ) -> Lanes3 {
@@ -21,14 +21,8 @@ pub fn sampled_emitters(
     let base = throughput.scale(light.evals.value).scale(light.radiance);
     let of_base = Contributions { base, density: light.pdf + light.evals.pdf, inv_survival: Lanes::splat(1.0) };
     let mut ends = LastSegments::NONE;
-    let unconnected = active & states.are(Kind::Unconnected);
-    if unconnected.any() {
-        let both_diffuse = context.diffuse(materials.roughness()) & context.diffuse(offset.materials.roughness());
-        let connected = unconnected & (light.points.delta | both_diffuse);
-        if connected.any() {
-            ends = LastSegments::to_lights(context.scene, surfaces.p, offset, &light.points, connected);
-        }
-        ends = ends.replaced(&extended.ends, unconnected & !connected);
+    if (active & states.are(Kind::Unconnected)).any() {
+        ends = extended.ends.replaced(&connected.ends, connected.lanes);
     }
     let just_connected = active & states.are(Kind::JustConnected);
     if just_connected.any() {

@@ -10,18 +10,13 @@ impl Segment<'_> {
     /// Differences of the emitters at the ends of the segments, and of the ambient light behind them.
     #[inline(always)]
     pub fn emission_differences(&self, context: &ShiftContext) -> SegmentDifferences {
-        let Self { vertices, offset, leaving, connectable, extended, .. } = *self;
+        let Self { vertices, offset, leaving, connected, extended, .. } = *self;
+        let connectable = connected.connectable;
         let mut differences = SegmentDifferences::NONE;
         let emits = leaving & vertices.hits_emitter;
         if emits.any() {
             let emission = &vertices.emission;
-            let mut ends = extended.ends;
-            let connected = emits & connectable;
-            if connected.any() {
-                let to_lights = LastSegments::to_lights;
-                let found = to_lights(context.scene, vertices.surfaces.p, offset, &emission.points, connected);
-                ends = ends.replaced(&found, connected);
-            }
+            let ends = extended.ends.replaced(&connected.hit.ends, connected.hit.lanes);
             differences.color = self.emitted(emits, (emission.radiance, emission.light_pdf), ends);
         }
         if context.ambient {

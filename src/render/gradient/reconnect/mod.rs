@@ -23,6 +23,7 @@ mod states;
 
 use std::ops::AddAssign;
 
+use self::connection::Connected;
 use self::direct::sampled_emitters;
 use self::extension::{Extended, Extensions};
 use self::offsets::{MISS, OUT_OF_FILM, OffsetSurfaces, SurfacePacket};
@@ -37,6 +38,8 @@ use crate::render::half_edges::HalfEdges;
 use crate::render::record::PathRecord;
 use crate::render::tracer::PathTracer;
 use crate::render::vertices::Vertices;
+use crate::scene::Purpose;
+use crate::scene::packet::ShadowRays;
 
 /// `reconnect`.
 pub const SHIFT: ShiftKind = ShiftKind {
@@ -60,8 +63,9 @@ struct Reconnect {
     states: LevelStates,
     next: LevelStates,
     extensions: Extensions,
-    /// Surfaces of the unconnected offsets of a packet.
-    offset: SurfacePacket,
+    /// Offsets of a packet, by half-edge, and their shadow rays.
+    packets: Vec<OffsetPacket>,
+    shadows: ShadowRays,
     /// Offsets that were connected in this wave.
     connected: u32,
 }
@@ -171,25 +175,60 @@ impl Reconnect {
         let at = (context, vertices, active);
         self.extensions.extend_to_lights(at, self.states.for_light(packet, slots), &mut self.offsets);
         self.extensions.extend_to_vertices(at, &next, self.states.for_scatter(packet, slots), &mut self.offsets);
+        self.connect((context, packet), (vertices, &next, active), slots);
         for slot in 0..slots {
-            let states = self.states.get(packet, slot);
-            let open = active & (states.0.open() | states.1.open());
+            let OffsetPacket { open, surfaces, connected } = &mut self.packets[slot];
             if !open.any() {
                 continue;
             }
-            let [light, scatter] = [states.0, states.1].map(|states| open & states.are(Kind::Unconnected));
-            if (light | scatter).any() {
-                let vertex_index = light.select_bits(states.0.vertex_index, states.1.vertex_index);
-                self.offsets.load(context.base, vertex_index, light | scatter, &mut self.offset);
-            }
-            let step = Step { context, vertices, next: &next, offset: &self.offset, active: open, slot };
-            let connected = &mut self.connected;
-            let found = shift_segment(&step, states, self.extensions.get(slot), (&mut self.next, connected));
+            connected.remove_occluded(&self.shadows);
+            let step = Step { context, vertices, next: &next, surfaces, connected, active: *open, slot };
+            let states = self.states.get(packet, slot);
+            let found = shift_segment(&step, states, self.extensions.get(slot), &mut self.next);
             for lane in open.lanes() {
                 let ambient = self.ambient.then(|| found.ambient.get(lane));
                 edges.add(vertices.id.0[lane] as usize, slot, (found.color.get(lane), ambient));
             }
         }
+    }
+
+    /// Connects the unconnected offsets of a packet across all half-edges and traces all their shadow rays.
+    fn connect(
+        &mut self,
+        (context, packet): (&ShiftContext, usize),
+        (vertices, next, active): (&Vertices, &NextVertices, Mask),
+        slots: usize,
+    ) {
+        self.shadows.clear();
+        self.packets.resize_with(slots.max(self.packets.len()), OffsetPacket::default);
+        for (slot, to) in self.packets.iter_mut().enumerate().take(slots) {
+            let (for_light, for_scatter) = self.states.get(packet, slot);
+            to.open = active & (for_light.open() | for_scatter.open());
+            let [light, scatter] = [for_light, for_scatter].map(|states| to.open & states.are(Kind::Unconnected));
+            to.connected = Connected::NONE;
+            if (light | scatter).any() {
+                let vertex_index = light.select_bits(for_light.vertex_index, for_scatter.vertex_index);
+                self.offsets.load(context.base, vertex_index, light | scatter, &mut to.surfaces);
+                connect(context, (vertices, next), (for_light, for_scatter), (to, &mut self.shadows));
+            }
+            self.connected += (light & vertices.lit).count() + to.connected.connectable.count();
+        }
+        self.shadows.trace(context.scene, Purpose::Connection);
+    }
+}
+
+/// Offsets of sixteen base paths across a half-edge of each.
+struct OffsetPacket {
+    /// Lanes whose offset is open.
+    open: Mask,
+    /// Surfaces of the unconnected ones.
+    surfaces: SurfacePacket,
+    connected: Connected,
+}
+
+impl Default for OffsetPacket {
+    fn default() -> Self {
+        Self { open: Mask::NONE, surfaces: SurfacePacket::default(), connected: Connected::NONE }
     }
 }
 
@@ -199,10 +238,24 @@ struct Step<'a> {
     vertices: &'a Vertices,
     next: &'a NextVertices,
     /// Surfaces of the unconnected offsets.
-    offset: &'a SurfacePacket,
+    surfaces: &'a SurfacePacket,
+    connected: &'a Connected,
     active: Mask,
     /// Number of the half-edge among those of each path.
     slot: usize,
+}
+
+vectorized! {
+    /// Connects the unconnected ones of some offsets.
+    fn connect(
+        context: &ShiftContext,
+        (vertices, next): (&Vertices, &NextVertices),
+        (for_light, for_scatter): (&States, &States),
+        (offset, shadows): (&mut OffsetPacket, &mut ShadowRays),
+    ) {
+        let states = (for_light, for_scatter, offset.open);
+        offset.connected = Connected::new(context, (vertices, next), &offset.surfaces, states, shadows);
+    }
 }
 
 vectorized! {
@@ -212,21 +265,20 @@ vectorized! {
         step: &Step,
         (for_light, for_scatter): (&States, &States),
         (to_light, to_vertex): (&Extended, &Extended),
-        (next_states, connected): (&mut LevelStates, &mut u32),
+        next_states: &mut LevelStates,
     ) -> SegmentDifferences {
-        let Step { context, vertices, next, offset, active, slot } = *step;
+        let Step { context, vertices, next, surfaces, connected, active, slot } = *step;
         let lit = active & vertices.lit & for_light.open();
-        *connected += (lit & for_light.are(Kind::Unconnected)).count();
         let mut differences = SegmentDifferences::NONE;
         if lit.any() {
-            differences.color = sampled_emitters(context, vertices, (offset, to_light), for_light, lit);
+            differences.color = sampled_emitters(context, vertices, (&connected.sampled, to_light), for_light, lit);
         }
         let leaving = context.leaving(vertices, next, active & for_scatter.open());
         if leaving.any() {
-            let segment = Segment::new(context, (vertices, next), (offset, to_vertex), for_scatter, leaving);
-            *connected += segment.connectable.count();
+            let offset = (surfaces, connected, to_vertex);
+            let segment = Segment::new(context, (vertices, next), offset, for_scatter, leaving);
             differences += segment.emission_differences(context);
-            differences += segment.continue_offsets(context, (next_states, slot));
+            differences += segment.continue_offsets((next_states, slot));
         }
         differences
     }

@@ -1,5 +1,6 @@
 //! Segments of sixteen base paths, with the offsets across one edge beside them.
 
+use super::connection::Connected;
 use super::extension::Extended;
 use super::offsets::SurfacePacket;
 use super::received::Received;
@@ -56,8 +57,8 @@ pub struct Segment<'a> {
     pub leaving: Mask,
     /// Lanes among them whose offset is unconnected.
     pub unconnected: Mask,
-    /// Lanes with an unconnected offset where both paths scatter diffusely, so that the offset can be connected.
-    pub connectable: Mask,
+    /// Offsets that are connected over the segments.
+    pub connected: &'a Connected,
     /// Offsets that have left their vertices by half-vector copies.
     pub extended: &'a Extended,
     /// BSDF values and densities of just connected offsets, which leave the base paths' vertices in the same directions as
@@ -120,15 +121,13 @@ impl<'a> Segment<'a> {
     pub fn new(
         context: &ShiftContext,
         (vertices, next): (&'a Vertices, &'a NextVertices),
-        (offset, extended): (&'a SurfacePacket, &'a Extended),
+        (offset, connected, extended): (&'a SurfacePacket, &'a Connected, &'a Extended),
         states: &'a States,
         leaving: Mask,
     ) -> Self {
         let unconnected = leaving & states.are(Kind::Unconnected);
-        let diffuse = context.diffuse(vertices.materials.roughness()) & context.diffuse(offset.materials.roughness());
-        let connectable = unconnected & diffuse & vertices.scatters.are(Lobe::Smooth);
         let moved = moved(context, vertices, states, leaving);
-        Self { vertices, next, offset, states, leaving, unconnected, connectable, extended, moved }
+        Self { vertices, next, offset, states, leaving, unconnected, connected, extended, moved }
     }
 }
 
