@@ -9,7 +9,7 @@ use fluxion::internals::math::lanes::{LANES, Lanes, Lanes3, Mask};
 use fluxion::mitsuba;
 use fluxion::render::{SHIFTS, Shift};
 use fluxion::render::{SampleId, sample};
-use fluxion::scene::packet::{Rays, Surfaces};
+use fluxion::scene::packet::{Rays, ShadowRays, Surfaces};
 use fluxion::scene::{Purpose, Scene};
 
 const SCENES: [&str; 3] = ["cornell-box", "glossy-metal", "door-ajar"];
@@ -70,9 +70,13 @@ fn visibility_packet(bencher: Bencher, name: &str) {
     let (from, met, rays) = bounced(&scene);
     let mut to = Surfaces::default();
     let both = scene.intersect_packet(&rays, met, Purpose::Path, &mut to);
-    bencher
-        .counter(ItemsCount::new(both.lanes().count()))
-        .bench_local(|| scene.mutually_visible_packet(&from, &to, both));
+    let mut shadows = ShadowRays::default();
+    bencher.counter(ItemsCount::new(both.lanes().count())).bench_local(|| {
+        shadows.clear();
+        let request = shadows.between(&from, &to, both);
+        shadows.trace(&scene, Purpose::Connection);
+        shadows.unoccluded(&request)
+    });
 }
 
 /// A sample of every pixel of a tile, with all differences and layers.

@@ -1,9 +1,9 @@
 //! Random numbers as a pure function of seed, pixel, sample and dimension.
 //!
-//! Even and odd samples follow a sequence each: every two dimensions are the first two of Sobol's sequence, shuffled and
-//! scrambled after Owen by hashes (Burley 2020). Pairs, pixels and the two sequences are scrambled apart, so that the halves
+//! Even and odd samples follow a sequence each: every choice takes the first two or four dimensions of Sobol's sequence, shuffled
+//! and scrambled after Owen by hashes (Burley 2020). Choices, pixels and the two sequences are scrambled apart, so that the halves
 //! of the samples are independent estimates; more sequences would stratify less (docs/design/performance.md). Every
-//! bounce owns its dimensions, whatever happened before it.
+//! bounce owns its choices, whatever happened before it.
 //!
 //! All pixels have the same position on the film in samples of the same number: the camera's ray of a pixel is then the
 //! ray that a path of its neighbour is shifted to.
@@ -13,6 +13,23 @@ use crate::math::{Vec2, rng, vec2};
 
 /// Sequences that samples belong to in turn.
 const SEQUENCES: u32 = 2;
+
+/// Constants that scramble the dimensions of a choice apart.
+const SALTS: [u32; 4] = [0x68bc_21eb, 0x02e5_be93, 0x3c6e_f372, 0x9b05_688c];
+
+/// Columns of the matrix of Sobol's third dimension, in reverse (primitive polynomial x² + x + 1).
+const THIRD: [u32; 32] = [
+    0x1, 0x3, 0x6, 0x9, 0x17, 0x3a, 0x71, 0xa3, 0x116, 0x339, 0x677, 0x9aa, 0x1601, 0x3903, 0x7706, 0xaa09, 0x10117,
+    0x3033a, 0x60671, 0x909a3, 0x171616, 0x3a3939, 0x717777, 0xa3aaaa, 0x1170001, 0x33a0003, 0x6710006, 0x9a30009,
+    0x16160017, 0x3939003a, 0x77770071, 0xaaaa00a3,
+];
+
+/// Columns of the matrix of Sobol's fourth dimension, in reverse (x³ + x + 1).
+const FOURTH: [u32; 32] = [
+    0x1, 0x3, 0x4, 0xa, 0x1f, 0x2e, 0x45, 0xc9, 0x11b, 0x2a4, 0x79a, 0xb67, 0x101e, 0x302d, 0x4041, 0xa0c3, 0x1f104,
+    0x2e28a, 0x457df, 0xc9bae, 0x11a105, 0x2a7289, 0x79e7db, 0xb6dba4, 0x100011a, 0x30002a7, 0x400079e, 0xa000b6d,
+    0x1f001001, 0x2e003003, 0x45004004, 0xc900a00a,
+];
 
 /// Position of all samples with one index in their sequences.
 #[derive(Clone, Copy, Debug)]
@@ -84,26 +101,45 @@ impl Sampler {
     /// Next-event estimation at the vertex after `depth` scattering events.
     #[inline(always)]
     pub fn light(&self, hashes: Bits, depth: u32) -> LightNumbers {
-        let first = depth.wrapping_mul(4).wrapping_add(2);
-        let [choice, _] = self.pair(part(hashes, first.wrapping_add(1)));
-        LightNumbers { choice, point: self.pair(part(hashes, first)) }
+        let [u, v, choice, _] = self.block(part(hashes, depth.wrapping_mul(2).wrapping_add(2)));
+        LightNumbers { choice, point: [u, v] }
     }
 
     /// Scattering at that vertex.
     #[inline(always)]
     pub fn scatter(&self, hashes: Bits, depth: u32) -> ScatterNumbers {
-        let first = depth.wrapping_mul(4).wrapping_add(4);
-        let [lobe, survival] = self.pair(part(hashes, first.wrapping_add(1)));
-        ScatterNumbers { lobe, direction: self.pair(part(hashes, first)), survival }
+        let [u, v, lobe, survival] = self.block(part(hashes, depth.wrapping_mul(2).wrapping_add(3)));
+        ScatterNumbers { lobe, direction: [u, v], survival }
     }
 
-    /// Two dimensions. Everything happens with bits in reverse, where scrambling after Owen is a hash that only carries
-    /// upwards.
+    /// Two dimensions.
     #[inline(always)]
     fn pair(&self, hashes: Bits) -> [Lanes; 2] {
-        let shuffled = scramble(Bits::splat(self.reversed), hashes);
-        let index = shuffled.map(u32::reverse_bits);
-        [dimension(index, hashes, 0x68bc_21eb), dimension(second_dimension(index), hashes, 0x02e5_be93)]
+        let index = self.index(hashes);
+        [dimension(index, hashes, SALTS[0]), dimension(second_dimension(index), hashes, SALTS[1])]
+    }
+
+    /// Four dimensions, of which the first two are the best distributed.
+    #[inline(always)]
+    fn block(&self, hashes: Bits) -> [Lanes; 4] {
+        let index = self.index(hashes);
+        // Bits that no sample so far has set would only shift all samples alike, as scrambling does.
+        let set = index.zip(scramble(Bits::ZERO, hashes), |index, first| index ^ first.reverse_bits());
+        let bits = (u32::BITS - self.reversed.trailing_zeros()) as usize;
+        let [third, fourth] = [&THIRD, &FOURTH].map(|columns| sum_of_columns(set, &columns[..bits]));
+        [
+            dimension(index, hashes, SALTS[0]),
+            dimension(second_dimension(index), hashes, SALTS[1]),
+            dimension(third, hashes, SALTS[2]),
+            dimension(fourth, hashes, SALTS[3]),
+        ]
+    }
+
+    /// Numbers of the sample within shuffled sequences. Everything happens with bits in reverse, where scrambling after Owen is a hash
+    /// that only carries upwards.
+    #[inline(always)]
+    fn index(&self, hashes: Bits) -> Bits {
+        scramble(Bits::splat(self.reversed), hashes).map(u32::reverse_bits)
     }
 }
 
@@ -156,6 +192,16 @@ fn second_dimension(index: Bits) -> Bits {
     })
 }
 
+/// A dimension of Sobol's sequence, in reverse, by its matrix.
+#[inline(always)]
+fn sum_of_columns(index: Bits, columns: &[u32]) -> Bits {
+    let mut sum = Bits::ZERO;
+    for (bit, column) in columns.iter().enumerate() {
+        sum = sum.zip(index, |sum, x| sum ^ (((x >> bit) & 1).wrapping_neg() & column));
+    }
+    sum
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -206,6 +252,24 @@ mod tests {
                 points.iter().for_each(|[u, v]| boxes[cell(*u, columns) * rows + cell(*v, rows)] += 1);
                 assert_eq!(boxes, [1; 64], "{columns} columns");
             }
+        }
+    }
+
+    #[test]
+    fn four_dimensions_are_stratified_together() {
+        for first in [0, 64, 65536] {
+            let points = (first..first + 64).map(|i| {
+                let sampler = Sampler::new(3, SEQUENCES * i);
+                let ScatterNumbers { lobe, direction: [u, v], survival } =
+                    sampler.scatter(Bits::splat(sampler.hash(9)), 4);
+                [u, v, lobe, survival].map(|lanes| lanes.0[3])
+            });
+            let (mut halves, mut strata) = ([0; 16], [0u64; 4]);
+            for point in points {
+                halves[point.iter().fold(0, |at, &x| 2 * at + usize::from(x >= 0.5))] += 1;
+                strata.iter_mut().zip(point).for_each(|(strata, x)| *strata |= 1 << (x * 64.0) as u32);
+            }
+            assert_eq!((halves, strata), ([4; 16], [u64::MAX; 4]), "from {first} on");
         }
     }
 
