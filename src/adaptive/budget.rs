@@ -34,11 +34,14 @@ pub(super) const FIRST_SPP: u32 = 8;
 /// Share of a budget that the first, uniform pass takes, and number of passes that follow it. docs/figures/adaptive.md has
 /// what they gain.
 pub(super) const FIRST_SHARE: f64 = 0.25;
-pub(super) const PASSES: u32 = 3;
+pub(super) const PASSES: u32 = 2;
 
-/// Share of the time that reconstructions between passes may take: less than adaptive sampling gains at equal time
-/// (docs/figures/adaptive.md).
-const OVERHEAD: f64 = 0.1;
+/// Share of the time that reconstructions between passes may take: what a second pass gains (docs/experiments.md).
+const OVERHEAD: f64 = 0.02;
+
+/// Share of the time that the reconstruction before the first of them may take: less than adaptive sampling gains at equal
+/// time (docs/figures/adaptive.md).
+const FIRST_OVERHEAD: f64 = 0.2;
 
 /// Least and largest growth of the number of samples by a pass on the way to a target error: a pass of less than 15 %
 /// would be mostly reconstruction, and one of more than 100 % would rest on an extrapolation too far.
@@ -122,7 +125,7 @@ impl Budget {
             Some(_) => f64::from(2 * FIRST_SPP),
             None => f64::from(FIRST_SPP).max(FIRST_SHARE * all),
         };
-        let too_slow = |time: Duration| self.by_error && spent.between > 2.0 * OVERHEAD * time.as_secs_f64();
+        let too_slow = |time: Duration| self.by_error && spent.between > FIRST_OVERHEAD * time.as_secs_f64();
         let decides = error.is_some() || !self.uniform;
         if decides && all > 1.5 * first && !time.is_some_and(too_slow) {
             return FirstPass::Uniform(first as u32);
@@ -185,7 +188,7 @@ mod tests {
         let budget = budget(Limits { spp: Some(48), ..Limits::default() });
         assert_eq!(budget.first_pass(&spent(1.0, 1.0)), FirstPass::Uniform(12));
         let (mut samples, mut left) = (1200.0, PASSES);
-        for done in 1..=3 {
+        for done in 1..=PASSES as usize {
             let now = Spent { samples, ..spent(0.0, 1.0) };
             let pass = budget.next_pass(&now, (done, left), Some(0.1)).unwrap();
             (samples, left) = (samples + pass.samples, pass.left);
@@ -202,10 +205,11 @@ mod tests {
         assert!((budget.affordable(&spent(1.0, 1.0)) - 890.0).abs() < 1e-9);
         let slow = Spent { reconstruction: 3.0, between: 3.0, ..spent(1.0, 1.0) };
         assert!(matches!(budget.first_pass(&slow), FirstPass::Everything(_)));
-        // A reconstruction of 0.6 s leaves time for one between two passes.
-        let pass = budget.next_pass(&Spent { between: 0.6, ..spent(10.0, 5.0) }, (1, PASSES), Some(0.1)).unwrap();
-        assert_eq!(pass.left, 1);
-        let last = budget.next_pass(&spent(10.0, 9.0), (3, 1), Some(0.1)).unwrap();
+        // A reconstruction of 0.1 s leaves time for one between two passes, one of 0.6 s does not.
+        let left =
+            |between| budget.next_pass(&Spent { between, ..spent(10.0, 5.0) }, (1, PASSES), Some(0.1)).unwrap().left;
+        assert_eq!([0.1, 0.6].map(left), [1, 0]);
+        let last = budget.next_pass(&spent(10.0, 9.0), (2, 1), Some(0.1)).unwrap();
         assert_eq!(budget.before_speed_check(last), Some(SPEED_CHECK_SHARE * last.samples));
     }
 

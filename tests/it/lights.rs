@@ -14,6 +14,10 @@ const CASES: &[(&str, &str)] = &[
     ("constant", r#"<emitter type="constant"/>"#),
     ("envmap", r#"<emitter type="envmap"><string name="filename" value="SCENES/assets/sky.exr"/></emitter>"#),
     (
+        "envmap",
+        r#"<emitter type="envmap"><string name="filename" value="SCENES/assets/sky.exr"/><boolean name="mis_compensation" value="false"/></emitter>"#,
+    ),
+    (
         "sunsky",
         r#"<emitter type="sunsky"><float name="sun_aperture" value="30"/><float name="turbidity" value="5"/><rgb name="albedo" value="0.1,0.5,0.9"/></emitter>"#,
     ),
@@ -69,6 +73,32 @@ fn every_emitter_has_a_case() {
     for plugin in PLUGINS {
         assert!(CASES.iter().any(|(name, _)| *name == plugin.name), "{} has no case", plugin.name);
     }
+}
+
+/// Directions darker than the mean are left to materials, but none is left to them alone.
+#[test]
+fn compensated_environments_sample_what_is_bright_and_never_nothing() {
+    let sky = crate::common::root().join("scenes/assets/sky.exr").display().to_string();
+    let with = |compensated: bool| {
+        scene(&format!(
+            r#"{}<emitter type="envmap"><string name="filename" value="{sky}"/><boolean name="mis_compensation" value="{compensated}"/></emitter>"#,
+            sensor("0,0,4", 4, 4)
+        ))
+    };
+    let scenes = [with(true), with(false)];
+    let mut ratios: Vec<(f32, f32)> = (0..2000)
+        .map(|i| {
+            let d = warp::sphere(numbers(i, 3));
+            let [compensated, plain] = scenes.each_ref().map(|scene| {
+                let emitter = &scene.emitters()[0];
+                emitter.pdf(Vec3::ZERO, &emitter.environment_point(d))
+            });
+            assert!(plain > 0.0 && compensated > 0.1 * plain, "{d}: {compensated} {plain}");
+            (plain, compensated / plain)
+        })
+        .collect();
+    ratios.sort_by(|a, b| a.0.total_cmp(&b.0));
+    assert!(ratios[0].1 < 0.6 && ratios[1999].1 > 1.2, "{:?} {:?}", ratios[0], ratios[1999]);
 }
 
 /// Pearson's test of sampled directions against the integrated density, over cells of the sphere.

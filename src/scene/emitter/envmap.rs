@@ -14,14 +14,14 @@ use crate::scene::texture::{self, Selection, Texels, bitmap};
 
 /// `envmap`.
 pub const PLUGIN: Plugin<Box<dyn Emitter>> =
-    Plugin { name: "envmap", parameters: "filename, scale = 1, to_world, gamma, mis_compensation (ignored)", make };
+    Plugin { name: "envmap", parameters: "filename, scale = 1, to_world, gamma, mis_compensation = true", make };
 
 fn make(object: &Object, loader: &mut dyn Loader) -> Result<Box<dyn Emitter>> {
     let scale = object.float("scale", 1.0)?;
     let to_world = object.transform("to_world")?;
-    object.ignore(&["mis_compensation"]);
+    let compensated = object.boolean("mis_compensation", true)?;
     let texels = enlarged(loader.texels(object, Selection { integers: bitmap::integers(object)?, channel: None })?);
-    Ok(Box::new(EnvMap::new(texels, scale, to_world)))
+    Ok(Box::new(EnvMap::new(texels, (scale, to_world), compensated)))
 }
 
 /// An image with enough texels to be interpolated around the sphere: a tiny one gets those between and beside its own.
@@ -38,6 +38,11 @@ fn enlarged(texels: Arc<Texels>) -> Arc<Texels> {
     };
     Arc::new(Texels::from_colors(columns, (0..columns * rows).map(texel).collect()))
 }
+
+/// Share of the mean that is taken off the weights of all directions, since materials sample them anyway (Karlik et al. 2019), and
+/// share of a weight that is kept: what no material samples well has to be found, too.
+const COMPENSATED: f32 = 0.85;
+const KEPT: f32 = 0.15;
 
 /// The image with its sampling density.
 pub struct EnvMap {
@@ -120,7 +125,8 @@ impl EnvMap {
         sample
     }
 
-    fn new(texels: Arc<Texels>, scale: f32, to_world: Mat4) -> Self {
+    /// `compensated`: directions that are no brighter than the mean are left to sampling by materials.
+    fn new(texels: Arc<Texels>, (scale, to_world): (f32, Mat4), compensated: bool) -> Self {
         let (width, height) = (texels.width, texels.height);
         let mut weights = vec![0.0; width * height];
         let value = |x: usize, y: usize| luminance(texels.texel(x % width, y)).max(0.0);
@@ -135,9 +141,23 @@ impl EnvMap {
         }
         let sines: f32 = (0..height).map(|y| (PI * (y as f32 + 0.5) / height as f32).sin()).sum();
         let total: f64 = weights.iter().map(|&w| f64::from(w)).sum();
-        let mean = (total / (f64::from(sines) * width as f64)) as f32 * scale;
+        let mean = (total / (f64::from(sines) * width as f64)) as f32;
+        if compensated {
+            for (y, row) in weights.chunks_exact_mut(width).enumerate() {
+                let sine = (PI * (y as f32 + 0.5) / height as f32).sin();
+                row.iter_mut().for_each(|weight| *weight = (*weight - COMPENSATED * mean * sine).max(KEPT * *weight));
+            }
+        }
         let to_local = to_world.inverse();
-        Self { texels, scale, to_world, to_local, partition: Partition::new(&weights, width), mean, area: 1.0 }
+        Self {
+            texels,
+            scale,
+            to_world,
+            to_local,
+            partition: Partition::new(&weights, width),
+            mean: mean * scale,
+            area: 1.0,
+        }
     }
 
     /// Texture coordinates of directions.
