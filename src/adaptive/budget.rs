@@ -31,16 +31,15 @@ impl Limits {
 /// allocate by.
 pub(super) const FIRST_SPP: u32 = 8;
 
-/// Share of a budget that the first, uniform pass takes, and number of passes that follow it. docs/figures/adaptive.md has
-/// what they gain.
+/// Share of a budget that the first, uniform pass takes, and number of passes that follow it (docs/experiments.md has what they
+/// gain).
 pub(super) const FIRST_SHARE: f64 = 0.25;
 pub(super) const PASSES: u32 = 2;
 
 /// Share of the time that reconstructions between passes may take: what a second pass gains (docs/experiments.md).
 const OVERHEAD: f64 = 0.02;
 
-/// Share of the time that the reconstruction before the first of them may take: less than adaptive sampling gains at equal
-/// time (docs/figures/adaptive.md).
+/// Share of the time that the reconstruction before the first of them may take: beyond it all samples are taken evenly.
 const FIRST_OVERHEAD: f64 = 0.2;
 
 /// Least and largest growth of the number of samples by a pass on the way to a target error: a pass of less than 15 %
