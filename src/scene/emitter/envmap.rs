@@ -128,23 +128,21 @@ impl EnvMap {
     /// `compensated`: directions that are no brighter than the mean are left to sampling by materials.
     fn new(texels: Arc<Texels>, (scale, to_world): (f32, Mat4), compensated: bool) -> Self {
         let (width, height) = (texels.width, texels.height);
+        let sines: Vec<f32> = (0..height).map(|y| (PI * (y as f32 + 0.5) / height as f32).sin()).collect();
         let mut weights = vec![0.0; width * height];
         let value = |x: usize, y: usize| luminance(texels.texel(x % width, y)).max(0.0);
         for y in 0..height {
-            let sine = (PI * (y as f32 + 0.5) / height as f32).sin();
             let (above, below) = (y.saturating_sub(1), (y + 1).min(height - 1));
             for x in 0..width {
                 // A cell is lit through interpolation by its neighbours too.
                 let row = |y| value(x + width - 1, y) + 2.0 * value(x, y) + value(x + 1, y);
-                weights[y * width + x] = (row(above) + 2.0 * row(y) + row(below)) * (sine / 16.0);
+                weights[y * width + x] = (row(above) + 2.0 * row(y) + row(below)) * (sines[y] / 16.0);
             }
         }
-        let sines: f32 = (0..height).map(|y| (PI * (y as f32 + 0.5) / height as f32).sin()).sum();
         let total: f64 = weights.iter().map(|&w| f64::from(w)).sum();
-        let mean = (total / (f64::from(sines) * width as f64)) as f32;
+        let mean = (total / (f64::from(sines.iter().sum::<f32>()) * width as f64)) as f32;
         if compensated {
-            for (y, row) in weights.chunks_exact_mut(width).enumerate() {
-                let sine = (PI * (y as f32 + 0.5) / height as f32).sin();
+            for (row, sine) in weights.chunks_exact_mut(width).zip(&sines) {
                 row.iter_mut().for_each(|weight| *weight = (*weight - COMPENSATED * mean * sine).max(KEPT * *weight));
             }
         }

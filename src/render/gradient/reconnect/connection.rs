@@ -4,7 +4,6 @@
 use super::difference::LastSegments;
 use super::offsets::SurfacePacket;
 use super::segment::{NextVertices, ShiftContext};
-use super::states::{Kind, States};
 use crate::math::lanes::{Lanes, Lanes3, Mask};
 use crate::render::vertices::Vertices;
 use crate::scene::Scene;
@@ -66,26 +65,24 @@ impl Connected {
         next: VertexConnections::NONE,
     };
 
-    /// Connects the offsets of the active lanes, in their states for light and for the continuation.
+    /// Connects the offsets of the lanes that are unconnected in their states for light and for the continuation.
     #[inline(always)]
     pub fn new(
         context: &ShiftContext,
         (vertices, next): (&Vertices, &NextVertices),
         offset: &SurfacePacket,
-        (for_light, for_scatter, active): (&States, &States, Mask),
+        (for_light, for_scatter): (Mask, Mask),
         shadows: &mut ShadowRays,
     ) -> Self {
         let Vertices { surfaces, materials, light, scatters, emission, .. } = vertices;
         let mut connected = Self::NONE;
         let diffuse = context.diffuse(materials.roughness()) & context.diffuse(offset.materials.roughness());
-        let unconnected = active & vertices.lit & for_light.are(Kind::Unconnected);
-        let to_points = unconnected & (light.points.delta | diffuse);
+        let to_points = for_light & vertices.lit & (light.points.delta | diffuse);
         let scene = context.scene;
         if to_points.any() {
             connected.sampled = LightConnections::new(scene, (surfaces.p, &light.points), offset, to_points, shadows);
         }
-        let leaving = context.leaving(vertices, next, active) & for_scatter.are(Kind::Unconnected);
-        connected.connectable = leaving & diffuse & scatters.are(Lobe::Smooth);
+        connected.connectable = context.leaving(vertices, next, for_scatter) & diffuse & scatters.are(Lobe::Smooth);
         let to_emitters = connected.connectable & vertices.hits_emitter;
         if to_emitters.any() {
             let target = (surfaces.p, &emission.points);

@@ -177,15 +177,15 @@ impl Reconnect {
         self.extensions.extend_to_vertices(at, &next, self.states.for_scatter(packet, slots), &mut self.offsets);
         self.connect((context, packet), (vertices, &next, active), slots);
         for slot in 0..slots {
-            let OffsetPacket { open, surfaces, connected } = &mut self.packets[slot];
-            if !open.any() {
+            let offset = &mut self.packets[slot];
+            if !offset.open.any() {
                 continue;
             }
-            connected.remove_occluded(&self.shadows);
-            let step = Step { context, vertices, next: &next, surfaces, connected, active: *open, slot };
+            offset.connected.remove_occluded(&self.shadows);
+            let step = Step { context, vertices, next: &next, offset, slot };
             let states = self.states.get(packet, slot);
             let found = shift_segment(&step, states, self.extensions.get(slot), &mut self.next);
-            for lane in open.lanes() {
+            for lane in step.offset.open.lanes() {
                 let ambient = self.ambient.then(|| found.ambient.get(lane));
                 edges.add(vertices.id.0[lane] as usize, slot, (found.color.get(lane), ambient));
             }
@@ -209,7 +209,7 @@ impl Reconnect {
             if (light | scatter).any() {
                 let vertex_index = light.select_bits(for_light.vertex_index, for_scatter.vertex_index);
                 self.offsets.load(context.base, vertex_index, light | scatter, &mut to.surfaces);
-                connect(context, (vertices, next), (for_light, for_scatter), (to, &mut self.shadows));
+                connect(context, (vertices, next), (light, scatter), (to, &mut self.shadows));
             }
             self.connected += (light & vertices.lit).count() + to.connected.connectable.count();
         }
@@ -237,24 +237,20 @@ struct Step<'a> {
     context: &'a ShiftContext<'a>,
     vertices: &'a Vertices,
     next: &'a NextVertices,
-    /// Surfaces of the unconnected offsets.
-    surfaces: &'a SurfacePacket,
-    connected: &'a Connected,
-    active: Mask,
+    offset: &'a OffsetPacket,
     /// Number of the half-edge among those of each path.
     slot: usize,
 }
 
 vectorized! {
-    /// Connects the unconnected ones of some offsets.
+    /// Connects the offsets that are unconnected in their states for light and for the continuation.
     fn connect(
         context: &ShiftContext,
-        (vertices, next): (&Vertices, &NextVertices),
-        (for_light, for_scatter): (&States, &States),
+        base: (&Vertices, &NextVertices),
+        unconnected: (Mask, Mask),
         (offset, shadows): (&mut OffsetPacket, &mut ShadowRays),
     ) {
-        let states = (for_light, for_scatter, offset.open);
-        offset.connected = Connected::new(context, (vertices, next), &offset.surfaces, states, shadows);
+        offset.connected = Connected::new(context, base, &offset.surfaces, unconnected, shadows);
     }
 }
 
@@ -267,13 +263,14 @@ vectorized! {
         (to_light, to_vertex): (&Extended, &Extended),
         next_states: &mut LevelStates,
     ) -> SegmentDifferences {
-        let Step { context, vertices, next, surfaces, connected, active, slot } = *step;
-        let lit = active & vertices.lit & for_light.open();
+        let Step { context, vertices, next, offset, slot } = *step;
+        let OffsetPacket { open, surfaces, connected } = offset;
+        let lit = *open & vertices.lit & for_light.open();
         let mut differences = SegmentDifferences::NONE;
         if lit.any() {
             differences.color = sampled_emitters(context, vertices, (&connected.sampled, to_light), for_light, lit);
         }
-        let leaving = context.leaving(vertices, next, active & for_scatter.open());
+        let leaving = context.leaving(vertices, next, *open & for_scatter.open());
         if leaving.any() {
             let offset = (surfaces, connected, to_vertex);
             let segment = Segment::new(context, (vertices, next), offset, for_scatter, leaving);
