@@ -129,15 +129,19 @@ impl EnvMap {
     fn new(texels: Arc<Texels>, (scale, to_world): (f32, Mat4), compensated: bool) -> Self {
         let (width, height) = (texels.width, texels.height);
         let sines: Vec<f32> = (0..height).map(|y| (PI * (y as f32 + 0.5) / height as f32).sin()).collect();
-        let mut weights = vec![0.0; width * height];
-        let value = |x: usize, y: usize| luminance(texels.texel(x % width, y)).max(0.0);
+        // A cell is lit through interpolation by its neighbours, too: in its row, and in those above and below.
+        let mut rows = Vec::with_capacity(width * height);
         for y in 0..height {
-            let (above, below) = (y.saturating_sub(1), (y + 1).min(height - 1));
-            for x in 0..width {
-                // A cell is lit through interpolation by its neighbours too.
-                let row = |y| value(x + width - 1, y) + 2.0 * value(x, y) + value(x + 1, y);
-                weights[y * width + x] = (row(above) + 2.0 * row(y) + row(below)) * (sines[y] / 16.0);
-            }
+            let values: Vec<f32> = (0..width).map(|x| luminance(texels.texel(x, y)).max(0.0)).collect();
+            let at = |x: usize| values[x % width];
+            rows.extend((0..width).map(|x| at(x + width - 1) + 2.0 * at(x) + at(x + 1)));
+        }
+        let mut weights = Vec::with_capacity(width * height);
+        for (y, sine) in sines.iter().enumerate() {
+            let row = |y: usize| &rows[y * width..][..width];
+            let (above, below) = (row(y.saturating_sub(1)), row((y + 1).min(height - 1)));
+            let around = above.iter().zip(row(y)).zip(below);
+            weights.extend(around.map(|((above, here), below)| (above + 2.0 * here + below) * (sine / 16.0)));
         }
         let total: f64 = weights.iter().map(|&w| f64::from(w)).sum();
         let mean = (total / (f64::from(sines.iter().sum::<f32>()) * width as f64)) as f32;
