@@ -138,6 +138,10 @@ fn of_scene(scene: &Scene, needs: Needs) -> Vec<Item> {
         (_, true) => "pixels look from different points of the lens",
         _ => "through a pinhole offsets begin as their neighbours' own paths",
     };
+    let light_tree = match stats.in_tree {
+        0 => "emitters with a place are few: they are chosen by power".to_owned(),
+        count => format!("{count} emitters and triangles are chosen by what they may send to a point"),
+    };
     let hidden = scene.integrator().hide_emitters;
     vec![
         item("materials", single > 0, of_shapes(single, "have a material that is evaluated ray by ray")),
@@ -148,6 +152,7 @@ fn of_scene(scene: &Scene, needs: Needs) -> Vec<Item> {
             stats.uniform_meshes < stats.emitters,
             format!("{} of {} emitters are meshes of uniform emission", stats.uniform_meshes, stats.emitters),
         ),
+        item("light-tree", stats.in_tree > 0, light_tree),
         item(
             "environment",
             scene.has_environment(),

@@ -1,6 +1,8 @@
 //! Makes the textures and meshes of the bundled scenes: `cargo run --release --example scene_assets`, in the
 //! repository's top folder. Everything is computed here, so everything is ours to give away.
 
+mod street;
+
 use std::f32::consts::TAU;
 use std::fmt::Write as _;
 use std::fs;
@@ -26,7 +28,7 @@ fn main() -> Result {
     torus.write_ply("scenes/assets/torus_binary.ply", true)?;
     torus.write_colored_ply("scenes/assets/torus_colors.ply")?;
     torus.write_serialized("scenes/assets/torus.serialized")?;
-    Ok(())
+    street::write()
 }
 
 /// Smooth noise of period one with `cells` cells.

@@ -6,6 +6,7 @@ use super::paths::{Packet, Paths};
 use super::vertices::Vertices;
 use crate::math::lanes::{Lanes, Lanes3, Mask};
 use crate::scene::bsdf::Lobe;
+use crate::scene::emitter::Receiver;
 use crate::scene::{Integrator, Scene};
 
 /// Largest survival probability of Russian roulette, so that paths in white rooms end. Radiance that is reflected with
@@ -66,7 +67,9 @@ vectorized! {
             to.eta.0[slot] = eta.0[lane];
             to.pdf.0[slot] = scatters.pdf.0[lane];
             to.smooth.0[slot] = smooth.0[lane];
-            to.from.set(slot, surfaces.p.get(lane));
+            let Receiver { p, n } = scene.receiver(surfaces, lane);
+            to.from.set(slot, p);
+            to.facing.set(slot, n);
             to.id.0[slot] = packet.id.0[lane];
             to.hash.0[slot] = packet.hash.0[lane];
             to.parent.0[slot] = first_index + lane as u32;

@@ -4,7 +4,7 @@ use super::paths::Packet;
 use super::vertices::Vertices;
 use crate::math::Rgb;
 use crate::scene::Scene;
-use crate::scene::emitter::{EnvmapHits, LightPoint};
+use crate::scene::emitter::{EnvmapHits, LightPoint, Receiver};
 
 /// An emitter that a path has hit.
 pub struct EmitterHit {
@@ -42,7 +42,7 @@ pub fn emitter_hit(
     let light_pdf = match envmap {
         _ if !packet.smooth.get(lane) => 0.0,
         Some(envmap) => envmap.pdf.0[lane],
-        None => scene.emitter_pdf(packet.from.get(lane), &point),
+        None => scene.emitter_pdf(&Receiver { p: packet.from.get(lane), n: packet.facing.get(lane) }, &point),
     };
     // Power heuristic with exponent two.
     let ratio = light_pdf / packet.pdf.0[lane];

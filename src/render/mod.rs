@@ -43,7 +43,7 @@ pub use self::wave::Samples;
 
 /// Number of the samples: raised whenever a change of the program changes any bit of any sample, or a decision of adaptive runs. Films of different epochs are not
 /// of the same samples, so they cannot be resumed or added.
-pub const EPOCH: u32 = 3;
+pub const EPOCH: u32 = 4;
 
 /// One sample of one pixel, the same whenever and wherever it is asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]

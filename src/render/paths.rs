@@ -19,6 +19,8 @@ pub struct Packet {
     pub smooth: Mask,
     /// Point that the current segment leaves.
     pub from: Lanes3,
+    /// Normals there, as [`Receiver`](crate::scene::emitter::Receiver) has them.
+    pub facing: Lanes3,
     /// Indices of the samples in the wave.
     pub id: Bits,
     /// Hashes of the paths' random numbers.
@@ -36,6 +38,7 @@ impl Packet {
         pdf: Lanes::ZERO,
         smooth: Mask::NONE,
         from: Lanes3::ZERO,
+        facing: Lanes3::ZERO,
         id: Bits::ZERO,
         hash: Bits::ZERO,
         parent: Bits::ZERO,
@@ -58,6 +61,7 @@ impl Packet {
         copy_lane!(self, to, from, lane; rays.direction.x, rays.direction.y, rays.direction.z, rays.t_far);
         copy_lane!(self, to, from, lane; throughput.x, throughput.y, throughput.z, eta, pdf, smooth);
         copy_lane!(self, to, from, lane; from.x, from.y, from.z, id, hash, parent);
+        copy_lane!(self, to, from, lane; facing.x, facing.y, facing.z);
     }
 }
 

@@ -23,7 +23,7 @@ use glam::DVec3;
 
 use self::accel::Accel;
 use self::bsdf::Bsdf;
-use self::emitter::{Choice, Emitter, LightPoint};
+use self::emitter::{Candidate, Choice, Emitter, LightPoint, Receiver};
 pub use self::light_groups::LightGroups;
 use self::packet::{EmitterInfo, ShapeInfo};
 pub use self::ray_log::{Purpose, Tally};
@@ -180,10 +180,18 @@ impl Scene {
             return Err(crate::error::Error::BadData(what.into()));
         }
         emitters.iter_mut().for_each(|emitter| emitter.enclose(accel.bounds()));
-        let emitter_choice = Choice::new(&emitters, &parts.emitter_weights);
-        let chance = |index| emitter_choice.as_ref().and_then(|choice| choice.constant(index));
-        let emitter_infos =
-            emitters.iter().enumerate().map(|(i, emitter)| EmitterInfo::new(&**emitter, chance(i))).collect();
+        let mut emitter_infos: Vec<_> = emitters.iter().map(|emitter| EmitterInfo::new(&**emitter)).collect();
+        let candidates: Vec<_> = (0..emitters.len())
+            .map(|i| Candidate {
+                emitter: &*emitters[i],
+                factor: parts.emitter_weights[i],
+                triangles: emitter_infos[i].triangles(),
+            })
+            .collect();
+        let emitter_choice = Choice::new(&candidates);
+        for (i, info) in emitter_infos.iter_mut().enumerate() {
+            info.set_chance(emitter_choice.as_ref().and_then(|choice| choice.constant(i)));
+        }
         let light_groups =
             options.light_groups.map(|text| LightGroups::parse(text, &parts.emitter_names)).transpose()?;
         let info = |shape| if options.fast_paths { ShapeInfo::new(shape) } else { ShapeInfo::new(shape).general() };
@@ -247,10 +255,10 @@ impl Scene {
     }
 
     /// Density with which [`Scene::sample_lights`] finds `point` from `from`.
-    pub fn emitter_pdf(&self, from: Vec3, point: &LightPoint) -> f32 {
-        let chance =
-            self.emitter_choice.as_ref().map_or(0.0, |choice| choice.probability(from, point.emitter as usize));
-        if chance > 0.0 { chance * self.emitters[point.emitter as usize].pdf(from, point) } else { 0.0 }
+    pub fn emitter_pdf(&self, from: &Receiver, point: &LightPoint) -> f32 {
+        let Some(choice) = &self.emitter_choice else { return 0.0 };
+        let chance = choice.probability(from, point.emitter as usize, point.at.primitive);
+        if chance > 0.0 { chance * self.emitters[point.emitter as usize].pdf(from.p, point) } else { 0.0 }
     }
 
     /// Radiance that `point` sends along `direction`, which points away from the emitter.

@@ -1,6 +1,7 @@
 //! Counts of a scene's shapes and emitters, by which the plan says what can be left out.
 
 use super::Scene;
+use super::emitter::Choice;
 
 /// Counts of shapes and emitters.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -19,6 +20,8 @@ pub struct SceneStats {
     pub emitters: usize,
     /// Emitters that are meshes of uniform radiance.
     pub uniform_meshes: usize,
+    /// Emitters and triangles in the tree of lights, none if it is left out.
+    pub in_tree: usize,
 }
 
 impl Scene {
@@ -33,6 +36,7 @@ impl Scene {
             perturbed: self.shapes.iter().filter(|shape| shape.bsdf.needs_derivatives()).count(),
             emitters: self.emitters.len(),
             uniform_meshes: self.emitter_infos.iter().filter(|info| info.mesh_light.is_some()).count(),
+            in_tree: self.emitter_choice.as_ref().map_or(0, Choice::in_tree),
         }
     }
 }

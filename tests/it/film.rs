@@ -110,6 +110,7 @@ fn the_plan_says_what_a_scene_can_do_without() {
         ("environment", "unit/diffuse", "unit/environment"),
         ("offset-rays", "unit/diffuse", "unit/lens"),
         ("emitters", "cornell-box", "unit/sphere-light"),
+        ("light-tree", "unit/sphere-light", "night-street"),
     ] {
         assert_eq!((computed(without, what), computed(with, what)), (false, true), "{what}");
     }

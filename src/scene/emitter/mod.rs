@@ -15,10 +15,10 @@ mod sunsky;
 mod tree;
 
 pub use self::area::Area;
-pub use self::choice::Choice;
+pub use self::choice::{Candidate, Choice, Chosen, Triangle};
 pub use self::envmap::{EnvMap, EnvmapHits};
 pub use self::plugins::PLUGINS;
-pub use self::tree::Extent;
+pub use self::tree::{Extent, Receiver};
 use super::Bounds;
 pub use super::light_point::{LightPoint, Position};
 use super::shape::Geometry;

@@ -3,7 +3,7 @@
 use crate::math::alias::Alias;
 use crate::math::{Rgb, Vec3};
 use crate::scene::closure::{Closure, Kind};
-use crate::scene::emitter::Emitter;
+use crate::scene::emitter::{Emitter, Triangle};
 use crate::scene::shape::mesh::Corners;
 use crate::scene::shape::{Geometry, Mesh};
 use crate::scene::{Shape, Surface};
@@ -18,6 +18,8 @@ pub struct ShapeInfo {
     pub kind: usize,
     /// Whether that is a diffuse lobe and nothing else.
     pub diffuse: bool,
+    /// Whether it scatters nothing to the side that light does not come from, as its shading normal tells.
+    pub one_sided: bool,
     /// The closure, if it is the same everywhere.
     pub closure: Option<Closure>,
     /// Whether its hits are completed in lanes: meshes whose material needs no derivatives.
@@ -47,9 +49,11 @@ impl ShapeInfo {
         let closes = closure.is_some();
         let kind = closure.map_or(Kind::None as usize, |closure| closure.kind());
         let diffuse = closure.is_some_and(|closure| closure.plainly_diffuse().any()) && !bsdf.transmits();
+        // Materials that turn the frame may see light beyond its horizon.
+        let one_sided = !bsdf.transmits() && !bsdf.needs_derivatives();
         let closure = closure.filter(|_| constant);
         let uv = closure.is_none() || emitter.is_some();
-        Self { emitter: *emitter, closes, kind, diffuse, mesh, uv, images, closure }
+        Self { emitter: *emitter, closes, kind, diffuse, one_sided, mesh, uv, images, closure }
     }
 }
 
@@ -85,14 +89,26 @@ pub struct LightTriangle {
 }
 
 impl EmitterInfo {
-    /// The properties of an emitter; `chance` is the probability of choosing it, if that is the same for all receivers.
-    pub fn new(emitter: &dyn Emitter, chance: Option<f32>) -> Self {
+    /// The properties of an emitter, of which the chance is not yet known.
+    pub fn new(emitter: &dyn Emitter) -> Self {
         let mesh_light = emitter.uniform_mesh().and_then(|(geometry, radiance)| match &**geometry {
             Geometry::Mesh(mesh) => UniformMeshLight::new(mesh, radiance),
             _ => None,
         });
-        let density = mesh_light.as_ref().map_or(0.0, |mesh_light| chance.unwrap_or_default() / mesh_light.area);
-        Self { mesh_light, density }
+        Self { mesh_light, density: 0.0 }
+    }
+
+    /// Sets the probability of choosing it, if that is the same for all receivers.
+    pub fn set_chance(&mut self, chance: Option<f32>) {
+        self.density = self.mesh_light.as_ref().map_or(0.0, |mesh_light| chance.unwrap_or_default() / mesh_light.area);
+    }
+
+    /// Its triangles, as the choice of emitters sees them.
+    pub fn triangles(&self) -> Option<(Vec<Triangle>, &Alias)> {
+        let UniformMeshLight { triangles, areas, .. } = self.mesh_light.as_ref()?;
+        let triangle =
+            |&LightTriangle { corner, sides: [a, b], n }: &_| Triangle { corners: [corner, corner + a, corner + b], n };
+        Some((triangles.iter().map(triangle).collect(), areas))
     }
 }
 

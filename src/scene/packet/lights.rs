@@ -4,8 +4,8 @@ use super::info::{LightTriangle, UniformMeshLight};
 use super::{Rays, Surfaces, surfaces};
 use crate::math::lanes::{Bits, LANES, Lanes, Lanes3, Mask};
 use crate::math::{Rgb, Vec3, vec2};
-use crate::scene::emitter::{EnvMap, EnvmapHits, LightPoint, Position};
-use crate::scene::{Scene, accel};
+use crate::scene::emitter::{Chosen, EnvMap, EnvmapHits, LightPoint, Position, Receiver};
+use crate::scene::{Scene, accel, texture};
 
 /// Emitter points, as [`LightPoint`] has them.
 #[derive(Clone, Debug)]
@@ -22,6 +22,8 @@ pub struct Lights {
     /// Lanes whose point is the only one of its emitter, which no path hits by scattering.
     pub delta: Mask,
     emitter: Bits,
+    /// Triangles of the points on meshes of uniform radiance.
+    triangle: Bits,
     /// Lanes whose point lies on a mesh of uniform radiance.
     uniform_mesh: Mask,
     /// Lanes whose point is a direction of the environment image, with densities and radiance.
@@ -41,6 +43,7 @@ impl Default for Lights {
             far: Mask::NONE,
             delta: Mask::NONE,
             emitter: Bits::ZERO,
+            triangle: Bits::ZERO,
             uniform_mesh: Mask::NONE,
             envmap: Mask::NONE,
             envmap_pdf: Lanes::ZERO,
@@ -64,6 +67,7 @@ impl Lights {
         self.far.set(lane, matches!(point.position, Position::Infinity { .. }));
         self.delta.set(lane, point.delta);
         self.emitter.0[lane] = point.emitter;
+        self.triangle.0[lane] = point.at.primitive;
         self.uniform_mesh.set(lane, uniform_mesh);
         self.envmap.set(lane, false);
         self.points[lane] = point;
@@ -93,7 +97,8 @@ impl Lights {
             return self.points[lane];
         }
         let position = Position::Surface { p: self.at.get(lane), n: self.n.get(lane) };
-        LightPoint { emitter: self.emitter.0[lane], ..LightPoint::drawn(position, Default::default()) }
+        let at = texture::Point { primitive: self.triangle.0[lane], ..Default::default() };
+        LightPoint { emitter: self.emitter.0[lane], ..LightPoint::drawn(position, at) }
     }
 
     /// Unit directions towards the points, and [`LightPoint::solid_angle`].
@@ -142,15 +147,23 @@ struct SampledTriangles {
 impl SampledTriangles {
     const NONE: Self = Self { triangles: [[[0.0; LANES]; 3]; 4], rest: [0.0; LANES], density: [0.0; LANES] };
 
-    /// Samples a triangle of a mesh for one lane; `density` is that of the whole choice, per area.
+    /// Sets one lane to a triangle of a mesh, which is chosen if none was, and returns its number; `density` is that of the whole
+    /// choice, per area.
     #[inline(always)]
-    fn set(&mut self, lane: usize, mesh_light: &UniformMeshLight, u: f32, density: f32) {
-        let (triangle, rest) = mesh_light.areas.sample(u);
+    fn set(
+        &mut self,
+        lane: usize,
+        (mesh_light, chosen): (&UniformMeshLight, Option<u32>),
+        u: f32,
+        density: f32,
+    ) -> u32 {
+        let (triangle, rest) = chosen.map_or_else(|| mesh_light.areas.sample(u), |triangle| (triangle as usize, u));
         let LightTriangle { corner, sides, n } = mesh_light.triangles[triangle];
         for (to, from) in self.triangles.iter_mut().zip([corner, sides[0], sides[1], n]) {
             (to[0][lane], to[1][lane], to[2][lane]) = from.into();
         }
         (self.rest[lane], self.density[lane]) = (rest, density);
+        triangle as u32
     }
 
     /// Sets the points of the lanes on meshes of uniform radiance, uniformly over their triangles as `warp::triangle`.
@@ -190,16 +203,19 @@ impl Scene {
             (Mask::NONE, Mask::NONE, Mask::NONE, Mask::NONE);
         let mut on_envmap = Mask::NONE;
         for lane in active.lanes() {
-            let (index, chance) = table.choose(from.p.get(lane), choice.0[lane]);
+            let receiver = self.receiver(from, lane);
+            let Some(Chosen { emitter: index, triangle, chance }) = table.choose(&receiver, choice.0[lane]) else {
+                continue;
+            };
             let info = &self.emitter_infos[index];
             if let Some(mesh_light) = &info.mesh_light {
                 let density = if info.density > 0.0 { info.density } else { chance / mesh_light.area };
-                triangles.set(lane, mesh_light, v.0[lane], density);
+                lights.triangle.0[lane] = triangles.set(lane, (mesh_light, triangle), v.0[lane], density);
                 lights.emitter.0[lane] = index as u32;
                 lights.uniform_mesh.set(lane, true);
                 continue;
             }
-            let (p, emitter) = (from.p.get(lane), &self.emitters[index]);
+            let (p, emitter) = (receiver.p, &self.emitters[index]);
             if self.envmap == Some(index as u32) {
                 on_envmap.set(lane, true);
                 pdf.0[lane] = chance;
@@ -248,20 +264,28 @@ impl Scene {
         radiance
     }
 
+    /// A surface as a receiver of light.
+    #[inline(always)]
+    pub fn receiver(&self, surfaces: &Surfaces, lane: usize) -> Receiver {
+        let side =
+            if self.shape_infos[surfaces.shape.0[lane] as usize].one_sided { surfaces.wi.z.0[lane] } else { 0.0 };
+        let n = surfaces.frame.n.get(lane) * if side == 0.0 { 0.0 } else { side.signum() };
+        Receiver { p: surfaces.p.get(lane), n }
+    }
+
     /// Densities with which [`Scene::sample_lights`] samples the points from other surfaces, from which they have the given
     /// solid angles.
     #[inline(always)]
-    pub fn light_pdf(&self, lights: &Lights, (from, angle): (Lanes3, Lanes), active: Mask) -> Lanes {
-        let mut density = Lanes::ZERO;
-        let Some(table) = self.emitter_choice.as_ref() else { return density };
-        let quick = if table.constant(0).is_some() { lights.uniform_mesh } else { Mask::NONE };
-        for lane in (active & quick).lanes() {
+    pub fn light_pdf(&self, lights: &Lights, (from, angle): (&Surfaces, Lanes), active: Mask) -> Lanes {
+        let (mut density, mut quick) = (Lanes::ZERO, Mask::NONE);
+        for lane in (active & lights.uniform_mesh).lanes() {
             density.0[lane] = self.emitter_infos[lights.emitter.0[lane] as usize].density;
+            quick.set(lane, density.0[lane] > 0.0);
         }
         let mut pdf = angle.greater(Lanes::ZERO).select(density / angle, Lanes::ZERO);
         pdf = lights.envmap.select(lights.envmap_pdf, pdf);
         for lane in (active & !(quick | lights.envmap)).lanes() {
-            pdf.0[lane] = self.emitter_pdf(from.get(lane), &lights.get(lane));
+            pdf.0[lane] = self.emitter_pdf(&self.receiver(from, lane), &lights.get(lane));
         }
         pdf
     }
@@ -287,7 +311,7 @@ impl Scene {
         let mut hits = envmap_hits(self.emitters[index].envmap()?, rays, active);
         hits.emitter = emitter;
         // Emitters at infinity are chosen with the same chance everywhere.
-        let chance = self.emitter_choice.as_ref().map_or(0.0, |choice| choice.probability(Vec3::ZERO, index));
+        let chance = self.emitter_choice.as_ref().map_or(0.0, |choice| choice.constant(index).unwrap_or_default());
         hits.pdf = hits.pdf * Lanes::splat(chance);
         Some(hits)
     }
@@ -298,7 +322,7 @@ impl Scene {
         match point.position {
             // After a delta lobe the density is zero, but offsets may need it.
             Position::Infinity { direction } if self.envmap == Some(point.emitter) => {
-                let pdf = if pdf > 0.0 { pdf } else { self.emitter_pdf(Vec3::ZERO, &point) };
+                let pdf = if pdf > 0.0 { pdf } else { self.emitter_pdf(&Receiver::NOWHERE, &point) };
                 lights.set_envmap(lane, (direction, point.emitter), pdf, radiance);
             }
             _ => lights.set(lane, point, self.emitter_infos[point.emitter as usize].mesh_light.is_some()),

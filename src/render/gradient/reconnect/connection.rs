@@ -173,7 +173,7 @@ impl LightConnections {
         let radiance = scene.light_radiance(lights, direction, in_range & evals.value.nonzero());
         let value = evals.value.scale(radiance);
         let carried = in_range & value.nonzero();
-        let density = scene.light_pdf(lights, (surfaces.p, angle), carried) + lights.scatter_pdf(evals.pdf);
+        let density = scene.light_pdf(lights, (surfaces, angle), carried) + lights.scatter_pdf(evals.pdf);
         let ends = LastSegments { contribution: value * jacobian, density: density * jacobian };
         Self { lanes, ends, shadows: shadows.towards_lights(scene, surfaces, lights, carried) }
     }

@@ -235,7 +235,7 @@ fn ends(
                 let point =
                     if far.get(lane) { scene.environment(direction) } else { scene.light_point_of(surfaces, lane) };
                 let Some(point) = point else { continue };
-                (scene.radiance(&point, -direction), scene.emitter_pdf(from.p.get(lane), &point))
+                (scene.radiance(&point, -direction), scene.emitter_pdf(&scene.receiver(from, lane), &point))
             }
         };
         let light_pdf = if copies.delta.get(lane) { 0.0 } else { light_pdf * copies.jacobian.0[lane] };
