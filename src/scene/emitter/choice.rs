@@ -62,8 +62,16 @@ struct Near {
     tree: Tree,
     /// Emitter and triangle of each item of the tree.
     items: Vec<(u32, Option<u32>)>,
-    /// For each emitter its first item, and the choice of its triangles.
-    emitters: Vec<Option<(u32, Option<Alias>)>>,
+    /// Every emitter in the tree, by its number.
+    emitters: Vec<Option<Placed>>,
+}
+
+/// An emitter in the tree.
+struct Placed {
+    /// Its item, or that of its first triangle.
+    first: u32,
+    /// Its triangles by area, if these are chosen one by one.
+    areas: Option<Alias>,
 }
 
 impl Choice {
@@ -119,28 +127,30 @@ impl Choice {
 }
 
 impl Near {
-    /// `None` where there is nothing to choose.
+    /// `None` where these are few.
     fn new(candidates: &[Candidate], powers: &[f32], weights: &[f32]) -> Option<Self> {
-        let mut near = (Vec::new(), Vec::new());
+        let (mut items, mut owners) = (Vec::new(), Vec::new());
         let mut emitters = Vec::with_capacity(candidates.len());
         for ((number, candidate), &power) in (0u32..).zip(candidates).zip(powers) {
             let Some(extent) = candidate.emitter.extent().filter(|_| power > 0.0) else {
                 emitters.push(None);
                 continue;
             };
-            let first = near.0.len() as u32;
+            let first = items.len() as u32;
             let apart = candidate.triangles.as_ref().filter(|(triangles, _)| TRIANGLES.contains(&triangles.len()));
-            emitters.push(Some((first, apart.map(|&(_, areas)| areas.clone()))));
-            match apart {
-                None => near.extend([(Item { extent, power }, (number, None))]),
-                Some((triangles, areas)) => near.extend((0u32..).zip(triangles).map(|(k, triangle)| {
-                    let power = power * areas.probability(k as usize);
-                    (Item { extent: triangle.extent(extent.reach), power }, (number, Some(k)))
-                })),
+            emitters.push(Some(Placed { first, areas: apart.map(|&(_, areas)| areas.clone()) }));
+            let Some((triangles, areas)) = apart else {
+                items.push(Item { extent, power });
+                owners.push((number, None));
+                continue;
+            };
+            for (k, triangle) in triangles.iter().enumerate() {
+                let power = power * areas.probability(k);
+                items.push(Item { extent: triangle.extent(extent.reach), power });
+                owners.push((number, Some(k as u32)));
             }
         }
-        let (all, items) = near;
-        if all.len() <= FEW {
+        if items.len() <= FEW {
             return None;
         }
         let part = |placed: bool| -> Vec<f32> {
@@ -154,8 +164,8 @@ impl Near {
             chance,
             others: Alias::new(&others),
             blind: Alias::new(&placed)?,
-            tree: Tree::new(&all)?,
-            items,
+            tree: Tree::new(&items)?,
+            items: owners,
             emitters,
         })
     }
@@ -169,7 +179,7 @@ impl Near {
         let u = (u / self.chance).min(1.0 - f32::EPSILON / 2.0);
         let (item, of_tree) = if u < BLIND {
             let (emitter, rest) = self.blind.sample(u / BLIND);
-            let (first, areas) = self.emitters[emitter].as_ref()?;
+            let Placed { first, areas } = self.emitters[emitter].as_ref()?;
             let item = *first as usize + areas.as_ref().map_or(0, |areas| areas.sample(rest).0);
             (item, self.tree.probability(from, item))
         } else {
@@ -182,7 +192,7 @@ impl Near {
 
     #[inline]
     fn probability(&self, blind: f32, from: &Receiver, emitter: usize, triangle: u32) -> f32 {
-        let Some((first, areas)) = &self.emitters[emitter] else { return blind };
+        let Some(Placed { first, areas }) = &self.emitters[emitter] else { return blind };
         let triangle = areas.as_ref().map(|_| triangle);
         let of_tree = self.tree.probability(from, (first + triangle.unwrap_or(0)) as usize);
         self.mixed(blind, emitter, triangle, of_tree)
@@ -191,7 +201,7 @@ impl Near {
     /// The chance by both ways, from the one that goes by power over all emitters and the one of the tree.
     #[inline(always)]
     fn mixed(&self, blind: f32, emitter: usize, triangle: Option<u32>, of_tree: f32) -> f32 {
-        let areas = self.emitters[emitter].as_ref().and_then(|(_, areas)| areas.as_ref());
+        let areas = self.emitters[emitter].as_ref().and_then(|placed| placed.areas.as_ref());
         // The share of its emitter's area.
         let share = areas.zip(triangle).map_or(1.0, |(areas, triangle)| areas.probability(triangle as usize));
         let by_place = if share > 0.0 { self.chance * of_tree / share } else { 0.0 };
@@ -242,7 +252,7 @@ mod tests {
         {
             let from = Receiver { p, n };
             let share = |&(emitter, triangle): &(usize, Option<u32>)| {
-                let areas = near.emitters[emitter].as_ref().and_then(|(_, areas)| areas.as_ref());
+                let areas = near.emitters[emitter].as_ref().and_then(|placed| placed.areas.as_ref());
                 let of_emitter =
                     areas.zip(triangle).map_or(1.0, |(areas, triangle)| areas.probability(triangle as usize));
                 choice.probability(&from, emitter, triangle.unwrap_or(0)) * of_emitter
