@@ -1,6 +1,7 @@
 //! Makes the textures and meshes of the bundled scenes: `cargo run --release --example scene_assets`, in the
 //! repository's top folder. Everything is computed here, so everything is ours to give away.
 
+mod ply;
 mod street;
 
 use std::f32::consts::TAU;
@@ -28,7 +29,7 @@ fn main() -> Result {
     torus.write_ply("scenes/assets/torus_binary.ply", true)?;
     torus.write_colored_ply("scenes/assets/torus_colors.ply")?;
     torus.write_serialized("scenes/assets/torus.serialized")?;
-    street::write()
+    Ok(street::write()?)
 }
 
 /// Smooth noise of period one with `cells` cells.
@@ -141,55 +142,18 @@ impl Torus {
 
     /// Without normals, so that they have to be made on loading.
     fn write_ply(&self, path: &str, binary: bool) -> Result {
-        let format = if binary { "binary_little_endian" } else { "ascii" };
-        let mut bytes = format!(
-            "ply\nformat {format} 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n\
-             property float u\nproperty float v\nelement face {}\nproperty list uchar int vertex_indices\nend_header\n",
-            self.positions.len(),
-            self.triangles.len()
-        )
-        .into_bytes();
-        for (p, [u, v]) in self.positions.iter().zip(&self.uvs) {
-            let values = [p.x, p.y, p.z, *u, *v];
-            if binary {
-                values.iter().for_each(|value| bytes.extend(value.to_le_bytes()));
-            } else {
-                writeln!(bytes, "{} {} {} {u} {v}", p.x, p.y, p.z)?;
-            }
-        }
-        for [a, b, c] in &self.triangles {
-            if binary {
-                bytes.push(3);
-                [a, b, c].iter().for_each(|index| bytes.extend((**index as i32).to_le_bytes()));
-            } else {
-                writeln!(bytes, "3 {a} {b} {c}")?;
-            }
-        }
-        Ok(fs::write(path, bytes)?)
+        let vertices = self.positions.iter().zip(&self.uvs).map(|(p, [u, v])| [p.x, p.y, p.z, *u, *v]);
+        Ok(ply::write(path, binary, ["x", "y", "z", "u", "v"], vertices, &self.triangles)?)
     }
 
     /// With normals and a colour at every vertex.
     fn write_colored_ply(&self, path: &str) -> Result {
         let properties = ["x", "y", "z", "nx", "ny", "nz", "color_0", "color_1", "color_2"];
-        let properties = properties.map(|name| format!("property float {name}\n")).concat();
-        let mut bytes = format!(
-            "ply\nformat binary_little_endian 1.0\nelement vertex {}\n{properties}element face {}\n\
-             property list uchar int vertex_indices\nend_header\n",
-            self.positions.len(),
-            self.triangles.len()
-        )
-        .into_bytes();
-        for (p, (n, [u, v])) in self.positions.iter().zip(self.normals.iter().zip(&self.uvs)) {
+        let vertices = self.positions.iter().zip(self.normals.iter().zip(&self.uvs)).map(|(p, (n, [u, v]))| {
             let color = vec3(0.2 + 0.6 * (TAU * u).cos().abs(), 0.3, 0.2 + 0.6 * (TAU * v).sin().abs());
-            for value in [p, n, &color].into_iter().flat_map(|vector| vector.to_array()) {
-                bytes.extend(value.to_le_bytes());
-            }
-        }
-        for triangle in &self.triangles {
-            bytes.push(3);
-            triangle.iter().for_each(|index| bytes.extend((*index as i32).to_le_bytes()));
-        }
-        Ok(fs::write(path, bytes)?)
+            [p.x, p.y, p.z, n.x, n.y, n.z, color.x, color.y, color.z]
+        });
+        Ok(ply::write(path, true, properties, vertices, &self.triangles)?)
     }
 
     fn write_serialized(&self, path: &str) -> Result {

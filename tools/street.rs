@@ -1,10 +1,10 @@
 //! Meshes of the scene `night-street`: houses with lit windows, signs and strings of bulbs.
 
-use std::fs;
+use std::io::Result;
 
 use fluxion::internals::math::{Vec3, rng, vec3};
 
-type Result = std::result::Result<(), Box<dyn std::error::Error>>;
+use crate::ply;
 
 /// Half of the width between the houses, and how far the street goes, in metres.
 const HALF_WIDTH: f32 = 5.0;
@@ -44,32 +44,21 @@ impl Mesh {
         self.positions
             .extend([Vec3::X, -Vec3::X, Vec3::Y, -Vec3::Y, Vec3::Z, -Vec3::Z].map(|axis| centre + radius * axis));
         for corner in 0..8u32 {
-            let [x, y, z] = [corner & 1, corner >> 1 & 1, corner >> 2].map(|side| side);
+            let [x, y, z] = [corner & 1, corner >> 1 & 1, corner >> 2];
             let face = [first + x, first + 2 + y, first + 4 + z];
             // Every mirrored axis turns a face around.
             self.triangles.push(if (x + y + z) % 2 == 0 { face } else { [face[0], face[2], face[1]] });
         }
     }
 
-    fn write(&self, name: &str) -> Result {
-        let mut bytes = format!(
-            "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n\
-             element face {}\nproperty list uchar int vertex_indices\nend_header\n",
-            self.positions.len(),
-            self.triangles.len()
-        )
-        .into_bytes();
-        self.positions.iter().flat_map(|p| p.to_array()).for_each(|value| bytes.extend(value.to_le_bytes()));
-        for triangle in &self.triangles {
-            bytes.push(3);
-            triangle.iter().for_each(|&index| bytes.extend((index as i32).to_le_bytes()));
-        }
-        Ok(fs::write(format!("scenes/assets/street_{name}.ply"), bytes)?)
+    fn write(&self, name: &str) -> Result<()> {
+        let path = format!("scenes/assets/street_{name}.ply");
+        ply::write(&path, true, ["x", "y", "z"], self.positions.iter().map(|p| p.to_array()), &self.triangles)
     }
 }
 
 /// Writes `scenes/assets/street_*.ply`.
-pub fn write() -> Result {
+pub fn write() -> Result<()> {
     let (mut walls, mut panes, mut bulbs) = (Mesh::default(), Mesh::default(), Mesh::default());
     let mut windows: [Mesh; LIGHTS] = Default::default();
     let mut signs: [Mesh; SIGNS] = Default::default();

@@ -29,13 +29,16 @@ pub struct Candidate<'a> {
     /// Factor of its chance; one of zero is never chosen.
     pub factor: f32,
     /// Its triangles and their choice by area, if it is a mesh of uniform radiance.
-    pub triangles: Option<(Vec<Triangle>, &'a Alias)>,
+    pub triangles: Option<(&'a [LightTriangle], &'a Alias)>,
 }
 
-/// A triangle of an emitter.
-pub struct Triangle {
-    /// Its corners.
-    pub corners: [Vec3; 3],
+/// An emissive triangle.
+#[derive(Clone, Copy)]
+pub struct LightTriangle {
+    /// A corner.
+    pub corner: Vec3,
+    /// Edges from that corner to the other two.
+    pub sides: [Vec3; 2],
     /// Unit normal on the emissive side.
     pub n: Vec3,
 }
@@ -209,9 +212,10 @@ impl Near {
     }
 }
 
-impl Triangle {
+impl LightTriangle {
     fn extent(&self, reach: f32) -> Extent {
-        Extent { bounds: Bounds::of(self.corners), axis: self.n, spread: 0.0, reach }
+        let Self { corner, sides: [a, b], n } = *self;
+        Extent { bounds: Bounds::of([corner, corner + a, corner + b]), axis: n, spread: 0.0, reach }
     }
 }
 

@@ -15,7 +15,7 @@ mod sunsky;
 mod tree;
 
 pub use self::area::Area;
-pub use self::choice::{Candidate, Choice, Chosen, Triangle};
+pub use self::choice::{Candidate, Choice, Chosen, LightTriangle};
 pub use self::envmap::{EnvMap, EnvmapHits};
 pub use self::plugins::PLUGINS;
 pub use self::tree::{Extent, Receiver};

@@ -3,7 +3,7 @@
 use crate::math::alias::Alias;
 use crate::math::{Rgb, Vec3};
 use crate::scene::closure::{Closure, Kind};
-use crate::scene::emitter::{Emitter, Triangle};
+use crate::scene::emitter::{Emitter, LightTriangle};
 use crate::scene::shape::mesh::Corners;
 use crate::scene::shape::{Geometry, Mesh};
 use crate::scene::{Shape, Surface};
@@ -77,17 +77,6 @@ pub struct UniformMeshLight {
     pub triangles: Vec<LightTriangle>,
 }
 
-/// An emissive triangle.
-#[derive(Clone, Copy)]
-pub struct LightTriangle {
-    /// A corner.
-    pub corner: Vec3,
-    /// Edges from that corner to the other two.
-    pub sides: [Vec3; 2],
-    /// Unit normal on the emissive side.
-    pub n: Vec3,
-}
-
 impl EmitterInfo {
     /// The properties of an emitter, of which the chance is not yet known.
     pub fn new(emitter: &dyn Emitter) -> Self {
@@ -103,12 +92,9 @@ impl EmitterInfo {
         self.density = self.mesh_light.as_ref().map_or(0.0, |mesh_light| chance.unwrap_or_default() / mesh_light.area);
     }
 
-    /// Its triangles, as the choice of emitters sees them.
-    pub fn triangles(&self) -> Option<(Vec<Triangle>, &Alias)> {
-        let UniformMeshLight { triangles, areas, .. } = self.mesh_light.as_ref()?;
-        let triangle =
-            |&LightTriangle { corner, sides: [a, b], n }: &_| Triangle { corners: [corner, corner + a, corner + b], n };
-        Some((triangles.iter().map(triangle).collect(), areas))
+    /// Its triangles and their choice by area, if it is a mesh of uniform radiance.
+    pub fn triangles(&self) -> Option<(&[LightTriangle], &Alias)> {
+        self.mesh_light.as_ref().map(|mesh_light| (&*mesh_light.triangles, &mesh_light.areas))
     }
 }
 

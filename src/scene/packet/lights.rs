@@ -1,10 +1,10 @@
 //! Sixteen emitter points.
 
-use super::info::{LightTriangle, UniformMeshLight};
+use super::info::UniformMeshLight;
 use super::{Rays, Surfaces, surfaces};
 use crate::math::lanes::{Bits, LANES, Lanes, Lanes3, Mask};
 use crate::math::{Rgb, Vec3, vec2};
-use crate::scene::emitter::{Chosen, EnvMap, EnvmapHits, LightPoint, Position, Receiver};
+use crate::scene::emitter::{Chosen, EnvMap, EnvmapHits, LightPoint, LightTriangle, Position, Receiver};
 use crate::scene::{Scene, accel, texture};
 
 /// Emitter points, as [`LightPoint`] has them.
@@ -267,10 +267,9 @@ impl Scene {
     /// A surface as a receiver of light.
     #[inline(always)]
     pub fn receiver(&self, surfaces: &Surfaces, lane: usize) -> Receiver {
-        let side =
-            if self.shape_infos[surfaces.shape.0[lane] as usize].one_sided { surfaces.wi.z.0[lane] } else { 0.0 };
-        let n = surfaces.frame.n.get(lane) * if side == 0.0 { 0.0 } else { side.signum() };
-        Receiver { p: surfaces.p.get(lane), n }
+        let one_sided = self.shape_infos[surfaces.shape.0[lane] as usize].one_sided;
+        let n = surfaces.frame.n.get(lane) * surfaces.wi.z.0[lane].signum();
+        Receiver { p: surfaces.p.get(lane), n: if one_sided { n } else { Vec3::ZERO } }
     }
 
     /// Densities with which [`Scene::sample_lights`] samples the points from other surfaces, from which they have the given

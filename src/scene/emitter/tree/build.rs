@@ -35,39 +35,49 @@ impl Tree {
         let number = self.nodes.len() as u32;
         self.nodes.push(Node::EMPTY);
         self.parents.push(parent);
-        for (slot, group) in groups(items).into_iter().enumerate() {
-            let whole = union(group.iter().map(|&(_, item)| item));
+        for (slot, Group { items, whole: Item { extent, power } }) in Group::new(items).cut().into_iter().enumerate() {
             let link = Link { node: number, slot: slot as u32 };
-            let child = if let [(item, _)] = *group {
+            let child = if let [(item, _)] = *items {
                 self.items[item as usize] = link;
                 Child::Item(item)
             } else {
-                Child::Node(self.add(group, link))
+                Child::Node(self.add(items, link))
             };
-            let Item { extent, power } = whole;
             self.nodes[number as usize].set(slot, child, &extent, power);
         }
         number
     }
 }
 
-/// Cuts items into as many groups as a node has room for, those first that cost most as they are.
-fn groups(items: &mut [Numbered]) -> Vec<&mut [Numbered]> {
-    let mut groups = vec![items];
-    while groups.len() < WIDTH {
-        let costs = groups
-            .iter()
-            .map(|group| if group.len() > 1 { cost(&union(group.iter().map(|&(_, item)| item))) } else { -1.0 });
-        let dearest = costs.enumerate().max_by(|a, b| a.1.total_cmp(&b.1));
-        let Some((at, _)) = dearest.filter(|&(_, cost)| cost >= 0.0) else { break };
-        let (first, second) = cut(groups.swap_remove(at));
-        groups.extend([first, second]);
-    }
-    groups
+/// Items that lie together.
+struct Group<'a> {
+    items: &'a mut [Numbered],
+    /// All of them as one.
+    whole: Item,
 }
 
-/// Cuts a group in two where these cost least together.
-fn cut(group: &mut [Numbered]) -> (&mut [Numbered], &mut [Numbered]) {
+impl<'a> Group<'a> {
+    fn new(items: &'a mut [Numbered]) -> Self {
+        let whole = items.iter().map(|&(_, item)| item).reduce(both).expect("a group is never empty");
+        Self { items, whole }
+    }
+
+    /// As many groups as a node has room for: those are cut first that cost most as they are.
+    fn cut(self) -> Vec<Self> {
+        let mut groups = vec![self];
+        while groups.len() < WIDTH {
+            let costs = groups.iter().enumerate().filter(|(_, group)| group.items.len() > 1);
+            let dearest = costs.max_by(|(_, a), (_, b)| cost(&a.whole).total_cmp(&cost(&b.whole)));
+            let Some((at, _)) = dearest else { break };
+            let (first, second) = halves(groups.swap_remove(at).items);
+            groups.extend([first, second].map(Self::new));
+        }
+        groups
+    }
+}
+
+/// Items in two parts, where these cost least together.
+fn halves(group: &mut [Numbered]) -> (&mut [Numbered], &mut [Numbered]) {
     let centre = |item: &Item| item.extent.bounds.sphere().0;
     let around = Bounds::of(group.iter().map(|(_, item)| centre(item)));
     let size = around.upper - around.lower;
@@ -111,8 +121,4 @@ fn cost(whole: &Item) -> f32 {
 
 fn both(a: Item, b: Item) -> Item {
     Item { extent: a.extent.union(&b.extent), power: a.power + b.power }
-}
-
-fn union(items: impl Iterator<Item = Item>) -> Item {
-    items.reduce(both).expect("a group is never empty")
 }
